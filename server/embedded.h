@@ -11,7 +11,6 @@ struct EmbeddedFile {
   std::string_view bytes;
 };
 
-std::span<const EmbeddedFile> embedded_schemas();    // schemas/*.schema.json
 std::span<const EmbeddedFile> embedded_examples();   // schemas/examples/*.json
 std::span<const EmbeddedFile> embedded_web();        // the operator page, server/web
 std::span<const EmbeddedFile> embedded_reference();  // reference.html and reference.css, server/reference

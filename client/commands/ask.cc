@@ -300,7 +300,7 @@ Rows common_rows(const char* robot_help) {
           {"--server", &O::server, server_help, named("URL"), Excludes{"--robot"}},
           {"robot,--robot-id", &O::robot_id, robot_help, named("ROBOT"), Needs{"--server"}},
           {"--request", &O::request_file,
-           "request as JSON (schemas/*-request.schema.json), - for standard input; flags override it",
+           "request as JSON, as the service takes it (openapi.json), - for standard input; flags override it",
            file_of("json")},
           {"--timeout", &O::timeout_s, "seconds to wait for the server", positive()},
           unit_row<O>(),

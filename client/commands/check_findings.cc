@@ -166,7 +166,7 @@ void judge_state(const nlohmann::json& state, const std::string& robot_id, Findi
   for (const nlohmann::json& c : state["contradictions"])
     findings.push_back({c["untrue"].get<bool>(), robot_id, c["channel"].get<std::string>(),
                         c["id"].get<std::string>() + ": " + c["says"].get<std::string>()});
-  // Reasons that are no damage: see schemas/robot-state.schema.json.
+  // Reasons that are no damage.
   constexpr std::array harmless{"restart", "gap", "outside_mission"};
   for (const auto& [reason, count] : state["faults"].items()) {
     const nlohmann::json& note = state["fault_notes"].value(reason, nlohmann::json());

@@ -38,8 +38,7 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
 // For a table as read: values that were dropped, filled, out of their limits or could not be joined.
 void judge(const telemetry::Import& import, const std::string& table, Findings& findings);
 
-// For a robot's state in a daemon's answer (schemas/robot-state.schema.json): its findings on the robot,
-// which may be silent by now.
+// For a robot's state in a daemon's answer: its findings on the robot, which may be silent by now.
 void judge_state(const nlohmann::json& state, const std::string& robot_id, Findings& findings);
 
 // The faults of a channel as transported, in a line; empty: none.

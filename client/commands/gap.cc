@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "answers/json/back_test_json.h"
-#include "base/json_number.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
 #include "client/commands/gap_parts.h"
@@ -21,6 +20,8 @@
 #include "client/files.h"
 #include "client/log_progress.h"
 #include "client/progress.h"
+#include "describe/input.h"
+#include "describe/table.h"
 #include "energy/back_test.h"
 #include "energy/power_windows.h"
 #include "gap/diagnose/recordings.h"
@@ -78,31 +79,39 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
                  energy::compare_with_regression(diagnosed, others.missions, robot, corrected)};
 }
 
-nlohmann::ordered_json to_json(const GapTest& test) {
-  nlohmann::ordered_json document =
-      nlohmann::ordered_json::parse(answers::back_test_table().text(test.replayed));
-  document["beside_regression"] = nullptr;
-  if (const auto& beside = test.beside_regression) {
-    const energy::MissedPower& missed = beside->missed;
-    document["beside_regression"] = {{"windows", beside->windows},
-                                     {"file_missed", json_number(missed.file)},
-                                     {"corrected_missed", json_number(missed.corrected)},
-                                     {"regression_missed", json_number(missed.regression)},
-                                     {"regression_wins", beside->regression_wins()}};
-  }
-  return document;
+const described::Table<GapTest>& test_table() {
+  using R = energy::RegressionComparison;
+  using M = energy::MissedPower;
+  using described::within;
+  static const auto beside =
+      described::Table<R>()
+          .value("windows", &R::windows, "windows with new readings")
+          .number_or_null("file_missed", within(&R::missed, &M::file), "mean |error| over mean |power| there")
+          .number_or_null("corrected_missed", within(&R::missed, &M::corrected), "with the effects found")
+          .number_or_null("regression_missed", within(&R::missed, &M::regression), "of a linear regression")
+          .value("regression_wins", &R::regression_wins, "the regression predicts better");
+  static const auto table =
+      described::Table<GapTest>()
+          .include(answers::back_test_table(), &GapTest::replayed)
+          .object(
+              "beside_regression",
+              [](const GapTest& t) { return t.beside_regression ? &*t.beside_regression : nullptr; },
+              "null: not compared", beside);
+  return table;
 }
 
-void print(const GapTest& test, const std::string& unit) {
-  print_back_test(Json::parse(answers::back_test_table().text(test.replayed)), unit);
+void print(const GapTest& test, const Json& told, const std::string& unit) {
+  print_back_test(told, unit);
   if (!test.beside_regression)
     return fmt::print("not compared with a linear regression: {}\n",
                       describe(test.beside_regression.error()));
-  const energy::MissedPower& missed = test.beside_regression->missed;
+  const auto percent = [&](const char* of) {
+    return number_of(told["beside_regression"], std::string(of) + "_missed", 1, 100);
+  };
   fmt::print(
-      "power error in windows with new readings: robot file {:.1f} %, corrected {:.1f} %, linear regression "
-      "on the missions of the diagnosis {:.1f} %\n",
-      as_percent(missed.file), as_percent(missed.corrected), as_percent(missed.regression));
+      "power error in windows with new readings: robot file {} %, corrected {} %, linear regression on the "
+      "missions of the diagnosis {} %\n",
+      percent("file"), percent("corrected"), percent("regression"));
 }
 
 // The diagnosis of logs and its test on other missions.
@@ -149,12 +158,13 @@ Result<Exit> gap_of_logs(const GapOptions& options, const robot::RobotModel& rob
   if (!options.compare_by.empty()) return gap_between_groups(recordings, robot, options, origin);
   TRY_ASSIGN(const auto judged, judge_recordings(options, recordings, robot));
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged.diagnosis);
+  const auto test = judged.test ? test_table().document(*judged.test) : nlohmann::ordered_json();
   if (options.json) {
-    if (judged.test) document["back_test"] = to_json(*judged.test);
+    if (judged.test) document["back_test"] = test;
     std::printf("%s\n", document.dump(2).c_str());
   } else {
     print_diagnosis(document);
-    if (judged.test) print(*judged.test, options.unit);
+    if (judged.test) print(*judged.test, test, options.unit);
   }
   if (!options.report.empty()) {
     const auto page = report::report_html(document, robot, origin);

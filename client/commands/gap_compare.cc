@@ -29,9 +29,8 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
   }
   for (const gap::ComparedEffect& e : c.effects) {
     fmt::print("{} {} above the group where it is weakest:\n", e.id, e.parameter);
-    for (std::size_t g = 0; g < e.groups.size(); ++g) {
-      const gap::GroupStrength& s = e.groups[g];
-      fmt::print("  {:<14} {:.4g} ± {:.2g}{}", c.groups[g].name, s.value, s.deviation,
+    for (const gap::GroupStrength& s : e.groups) {
+      fmt::print("  {:<14} {:.4g} ± {:.2g}{}", s.group, s.value, s.deviation,
                  e.unit == "1" ? "" : " " + e.unit);
       if (std::isfinite(s.energy_per_m_j)) fmt::print(" ({})", signed_per_way(s.energy_per_m_j, unit));
       fmt::print("\n");
@@ -39,11 +38,9 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
   }
   if (c.difference) {
     const gap::GroupDifference& d = *c.difference;
-    fmt::print("{} takes {} more than {}: {} by motion and load", c.groups[d.to].name,
-               energy_per_way_text(d.energy_per_m_j, unit), c.groups[d.from].name,
-               signed_per_way(d.by_motion_j, unit));
-    for (std::size_t k = 0; k < c.effects.size(); ++k)
-      fmt::print(", {} by {}", signed_per_way(d.by_effect_j[k], unit), c.effects[k].id);
+    fmt::print("{} takes {} more than {}: {} by motion and load", d.to,
+               energy_per_way_text(d.energy_per_m_j, unit), d.from, signed_per_way(d.by_motion_j, unit));
+    for (const auto& [id, joules] : d.by_effect_j) fmt::print(", {} by {}", signed_per_way(joules, unit), id);
     fmt::print(", {} unexplained\n", signed_per_way(d.unexplained_j, unit));
   }
   fmt::print("effects common to all groups:");

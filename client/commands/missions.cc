@@ -6,9 +6,12 @@
 #include "client/commands/option.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
+#include "history/records.h"
 
 namespace joulecast::client {
 namespace {
+
+constexpr auto& state_names = history::names_of<history::MissionState>;
 
 struct MissionsOptions {
   std::string server, unit = energy_units.front();
@@ -52,7 +55,7 @@ void add_missions(CLI::App& program, Exit& exit) {
        {"robot,--robot-id", Text{"robot_id"}, "only this robot's", named("ROBOT")},
        {"--mission-id", Text{"mission_id"}, "only those with this mission id", named("ID")},
        {"--state", Text{"state"}, "only those in this state",
-        one_of({"open", "finished", "aborted", "unfinished", "superseded", "interrupted"})},
+        one_of({std::begin(state_names), std::end(state_names)})},
        {"--incomplete", Text{"incomplete"},
         "true: only those with unmeasured parts; false: only those without", one_of({"true", "false"})},
        {"--from", Text{"from_utime_us"}, from_help, time_value()},

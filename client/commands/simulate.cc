@@ -176,20 +176,19 @@ struct Outlets {
   std::optional<OutputFile> log_file;
 
   Result<void> send(const std::string& robot_id, const vr::Emission& emission) {
-    const auto bytes =
-        std::visit([&](const auto& message) { return encoded(robot_id, message); }, emission.message);
-    if (!bytes) return tl::unexpected(bytes.error());
+    TRY_ASSIGN(const auto bytes,
+               std::visit([&](const auto& message) { return encoded(robot_id, message); }, emission.message));
     constexpr telemetry::Subject subjects[] = {telemetry::Subject::mission_event,
                                                telemetry::Subject::telemetry, telemetry::Subject::covariates};
     const std::string channel = telemetry::channel_of(subjects[emission.message.index()], robot_id);
     if (link) {
       const auto key = keys.find(robot_id);
       const auto sent =
-          key == keys.end() ? link->publish(channel, *bytes) : publish_signed(channel, *bytes, key->second);
+          key == keys.end() ? link->publish(channel, bytes) : publish_signed(channel, bytes, key->second);
       if (!sent) return sent;
     }
     if (log) {
-      TRY(log->write(emission.utime_us, channel, *bytes));
+      TRY(log->write(emission.utime_us, channel, bytes));
     }
     return {};
   }

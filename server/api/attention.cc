@@ -527,27 +527,14 @@ void AttentionList::look() {
 }
 
 Part attention_part() {
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/attention",
-        .operation_id = "listAttention",
-        .role = http::Role::read,
-        .summary = "Robots that need attention now, the most urgent first, each with its reasons and "
-                   "what to do",
-        .response_schema = "attention"},
-       answered_by(get_attention)});
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/robots/{id}/acknowledge",
-        .operation_id = "acknowledgeAttention",
-        .role = http::Role::operate,
-        .summary = "Acknowledges a robot's reasons of one kind, with a note, until their condition ends",
-        .request_schema = "acknowledge-request",
-        .response_schema = "attention-entry",
-        .error_statuses = {404, 422},
-        .run = http::Run::write},
-       answered_by(acknowledge)});
+  Rows rows;
+  rows.add(Method::get, "/v1/attention", "listAttention", http::Role::read,
+           "Robots that need attention now, the most urgent first, each with its reasons and what to do",
+           "attention", get_attention);
+  rows.add(Method::post, "/v1/robots/{id}/acknowledge", "acknowledgeAttention", http::Role::operate,
+           "Acknowledges a robot's reasons of one kind, with a note, until their condition ends",
+           "attention-entry", acknowledge,
+           {.request_schema = "acknowledge-request", .error_statuses = {404, 422}, .run = http::Run::write});
   return {std::move(rows),
           {{"acknowledge-request", acknowledge_input().schema()},
            {"attention", attention_table().schema()},

@@ -44,16 +44,12 @@ Result<Response> audit(const Services& services, const Request& request) {
 }  // namespace
 
 Part audit_part() {
-  std::vector<TableRow> rows;
-  rows.push_back({{.method = http::Method::get,
-                   .path = "/v1/audit",
-                   .operation_id = "listAudit",
-                   .role = http::Role::admin,
-                   .summary = "Changes, rejected requests and sign-ins with their tokens; joulecast audit "
-                              "verify checks the chain of hashes",
-                   .parameters = log_parameters("only entries of this action", usual_request_order),
-                   .response_schema = "audit"},
-                  answered_by(audit)});
+  Rows rows;
+  rows.add(http::Method::get, "/v1/audit", "listAudit", http::Role::admin,
+           "Changes, rejected requests and sign-ins with their tokens; joulecast audit verify checks the "
+           "chain of hashes",
+           "audit", audit,
+           {.parameters = log_parameters("only entries of this action", usual_request_order)});
   return {std::move(rows),
           {{"audit", described::of_page("Entries of the audit", "entries", "in the requested order",
                                         entry_table().of_member())}}};

@@ -130,15 +130,11 @@ Result<Response> cluster(const Services& services, const Request&) {
 }  // namespace
 
 Part cluster_part() {
-  std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/cluster",
-                   .operation_id = "getCluster",
-                   .role = http::Role::read,
-                   .summary = "The daemons that share the fleet, and which of them keeps which robot; name "
-                              "is null where cluster.name is not set",
-                   .response_schema = "cluster"},
-                  answered_by(cluster)});
+  Rows rows;
+  rows.add(Method::get, "/v1/cluster", "getCluster", http::Role::read,
+           "The daemons that share the fleet, and which of them keeps which robot; name is null where "
+           "cluster.name is not set",
+           "cluster", cluster);
   return {std::move(rows), {{"cluster", cluster_table().schema()}}};
 }
 

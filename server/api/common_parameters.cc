@@ -42,8 +42,7 @@ Parameter limit_parameter(std::string things, std::int64_t maximum) {
 }
 
 Parameter cursor_parameter() {
-  return {
-      .name = "cursor", .type = Parameter::Type::text, .description = "the next_cursor of the page before"};
+  return {.name = "cursor", .description = "the next_cursor of the page before"};
 }
 
 Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
@@ -109,7 +108,7 @@ Result<std::vector<std::string>> robot_ids_of(const http::Request& request) {
 }
 
 std::vector<Parameter> time_parameters(const std::string& name, const std::string& what) {
-  return {{.name = name, .type = Parameter::Type::text, .description = what + ", " + std::string(utc_forms)},
+  return {{.name = name, .description = what + ", " + std::string(utc_forms)},
           {.name = name + "_utime_us",
            .type = Parameter::Type::integer,
            .description = "the same in microseconds since 1970"}};

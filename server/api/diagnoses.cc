@@ -18,7 +18,6 @@ namespace joulecast::api {
 namespace {
 
 using http::Method;
-using http::Parameter;
 using http::Request;
 using http::Response;
 
@@ -263,70 +262,37 @@ Result<Response> events(const Services& services, const Request& request) {
 }  // namespace
 
 Part diagnosis_part() {
-  using Type = Parameter::Type;
-  std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::post,
-                   .path = "/v1/diagnoses",
-                   .operation_id = "startDiagnosis",
-                   .role = http::Role::operate,
-                   .summary = "Starts a diagnosis of the gap between a robot and its model over its stored "
-                              "missions, some of which are held back for a back-test",
-                   .request_schema = "diagnosis-request",
-                   .response_schema = "diagnosis",
-                   .success_status = 202,
-                   .error_statuses = {404, 409, 422},
-                   .run = http::Run::write},
-                  answered_by(start)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/diagnoses",
-        .operation_id = "listDiagnoses",
-        .role = http::Role::read,
-        .summary = "Diagnoses, newest first, without their whole results",
-        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                       limit_parameter("diagnoses a page", history::max_page_size),
-                       cursor_parameter()},
-        .response_schema = "diagnosis-list",
-        .csv = true,
-        .rounded = true},
-       answered_by(list_diagnoses)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/diagnoses/{id}",
-                   .operation_id = "getDiagnosis",
-                   .role = http::Role::read,
-                   .summary = "State and result of a diagnosis",
-                   .response_schema = "diagnosis",
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(get_diagnosis)});
-  rows.push_back({{.method = Method::del,
-                   .path = "/v1/diagnoses/{id}",
-                   .operation_id = "cancelDiagnosis",
-                   .role = http::Role::operate,
-                   .summary = "Cancels a waiting or running diagnosis",
-                   .response_schema = "diagnosis",
-                   .error_statuses = {404, 409},
-                   .run = http::Run::write},
-                  answered_by(cancel)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/diagnoses/{id}/events",
-                   .operation_id = "streamDiagnosis",
-                   .role = http::Role::read,
-                   .summary = "The progress of a diagnosis as server-sent events, until it has ended",
-                   .response_type = "text/event-stream",
-                   .events = {{"progress", "diagnosis-progress", "while it waits or runs, at every step"},
-                              {"ended", "listed-diagnosis", "last of the stream"}},
-                   .error_statuses = {404}},
-                  answered_by(events)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/diagnoses/{id}/report",
-                   .operation_id = "getDiagnosisReport",
-                   .role = http::Role::read,
-                   .summary = "The report of a diagnosis as one self-contained page",
-                   .response_type = "text/html",
-                   .error_statuses = {404},
-                   .run = http::Run::compute},
-                  answered_by(report)});
+  Rows rows;
+  rows.add(Method::post, "/v1/diagnoses", "startDiagnosis", http::Role::operate,
+           "Starts a diagnosis of the gap between a robot and its model over its stored missions, some of "
+           "which are held back for a back-test",
+           "diagnosis", start,
+           {.request_schema = "diagnosis-request",
+            .success_status = 202,
+            .error_statuses = {404, 409, 422},
+            .run = http::Run::write});
+  rows.add(Method::get, "/v1/diagnoses", "listDiagnoses", http::Role::read,
+           "Diagnoses, newest first, without their whole results", "diagnosis-list", list_diagnoses,
+           {.parameters = {{.name = "robot_id", .description = "only of this robot"},
+                           limit_parameter("diagnoses a page", history::max_page_size),
+                           cursor_parameter()},
+            .csv = true,
+            .rounded = true});
+  rows.add(Method::get, "/v1/diagnoses/{id}", "getDiagnosis", http::Role::read,
+           "State and result of a diagnosis", "diagnosis", get_diagnosis,
+           {.etag = true, .error_statuses = {404}});
+  rows.add(Method::del, "/v1/diagnoses/{id}", "cancelDiagnosis", http::Role::operate,
+           "Cancels a waiting or running diagnosis", "diagnosis", cancel,
+           {.error_statuses = {404, 409}, .run = http::Run::write});
+  rows.add(Method::get, "/v1/diagnoses/{id}/events", "streamDiagnosis", http::Role::read,
+           "The progress of a diagnosis as server-sent events, until it has ended", "", events,
+           {.response_type = "text/event-stream",
+            .events = {{"progress", "diagnosis-progress", "while it waits or runs, at every step"},
+                       {"ended", "listed-diagnosis", "last of the stream"}},
+            .error_statuses = {404}});
+  rows.add(Method::get, "/v1/diagnoses/{id}/report", "getDiagnosisReport", http::Role::read,
+           "The report of a diagnosis as one self-contained page", "", report,
+           {.response_type = "text/html", .error_statuses = {404}, .run = http::Run::compute});
   return {std::move(rows),
           {{"diagnosis", diagnosis_table().schema()},
            {"diagnosis-progress", progress_table().schema()},

@@ -198,31 +198,25 @@ Result<Response> floor_map(const Services& services, const Request& request) {
 }  // namespace
 
 Part floor_map_part() {
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/floor-map",
-        .operation_id = "mapFloor",
-        .role = http::Role::read,
-        .summary = "Energy and gap by squares of the floor, from the traces of missions, with zones of "
-                   "significant departure; of a history of more than a million seconds an evenly distributed "
-                   "sample of the missions is evaluated",
-        .parameters =
-            with(with(time_parameters("from", "only missions that started at or after this time"),
-                      time_parameters("to", "only missions that started before this time")),
-                 {{.name = "robot_id",
-                   .type = Parameter::Type::text,
-                   .description = "only this robot, or these, separated by commas: those that share a map"},
-                  {.name = "cell_m",
-                   .type = Parameter::Type::number,
-                   .description = "side of a square, m; 1 if absent",
-                   .minimum = history::least_floor_cell_m,
-                   .maximum = history::greatest_floor_cell_m},
-                  limit_parameter("squares, the longest visited first; 10000 if absent", most_cells)}),
-        .response_schema = "floor-map",
-        .csv = true,
-        .rounded = true},
-       answered_by(floor_map)});
+  Rows rows;
+  rows.add(Method::get, "/v1/floor-map", "mapFloor", http::Role::read,
+           "Energy and gap by squares of the floor, from the traces of missions, with zones of significant "
+           "departure; of a history of more than a million seconds an evenly distributed sample of the "
+           "missions is evaluated",
+           "floor-map", floor_map,
+           {.parameters = with(
+                with(time_parameters("from", "only missions that started at or after this time"),
+                     time_parameters("to", "only missions that started before this time")),
+                {{.name = "robot_id",
+                  .description = "only this robot, or these, separated by commas: those that share a map"},
+                 {.name = "cell_m",
+                  .type = Parameter::Type::number,
+                  .description = "side of a square, m; 1 if absent",
+                  .minimum = history::least_floor_cell_m,
+                  .maximum = history::greatest_floor_cell_m},
+                 limit_parameter("squares, the longest visited first; 10000 if absent", most_cells)}),
+            .csv = true,
+            .rounded = true});
   return {std::move(rows), {{"floor-map", floor_map_table().schema()}}};
 }
 

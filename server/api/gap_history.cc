@@ -177,38 +177,29 @@ Result<Response> list_events(const Services& services, const Request& request) {
 }  // namespace
 
 Part gap_history_part() {
-  std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}/gap-history",
-                   .operation_id = "getGapHistory",
-                   .role = http::Role::read,
-                   .summary = "Measured over modelled energy of a robot's missions with marks where it "
-                              "drifted, the models adopted, and the robots of its kind",
-                   .parameters = {limit_parameter("missions, newest first", max_gap_missions)},
-                   .response_schema = "gap-history",
-                   .csv = true,
-                   .rounded = true,
-                   .error_statuses = {404}},
-                  answered_by(gap_history)});
+  Rows rows;
+  rows.add(Method::get, "/v1/robots/{id}/gap-history", "getGapHistory", http::Role::read,
+           "Measured over modelled energy of a robot's missions with marks where it drifted, the models "
+           "adopted, and the robots of its kind",
+           "gap-history", gap_history,
+           {.parameters = {limit_parameter("missions, newest first", max_gap_missions)},
+            .csv = true,
+            .rounded = true,
+            .error_statuses = {404}});
   return {std::move(rows), {{"gap-history", gap_history_table().schema()}}};
 }
 
 Part event_log_part() {
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/event-log",
-        .former_path = "/v1/audit-log",
-        .operation_id = "listEventLog",
-        .role = http::Role::read,
-        .summary =
-            "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
-        .parameters = with({{.name = "robot_id",
-                             .description = "only entries of this robot, or of these, separated by commas"}},
-                           log_parameters("only entries of this kind", usual_event_order)),
-        .response_schema = "event-log",
-        .csv = true},
-       answered_by(list_events)});
+  Rows rows;
+  rows.add(
+      Method::get, "/v1/event-log", "listEventLog", http::Role::read,
+      "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
+      "event-log", list_events,
+      {.former_path = "/v1/audit-log",
+       .parameters = with({{.name = "robot_id",
+                            .description = "only entries of this robot, or of these, separated by commas"}},
+                          log_parameters("only entries of this kind", usual_event_order)),
+       .csv = true});
   return {std::move(rows),
           {{"event-log", described::of_page("Entries of the event log", "events", "in the requested order",
                                             event_table().of_member())}}};

@@ -228,68 +228,37 @@ Part map_part() {
                            .minimum = -bound,
                            .maximum = bound};
   };
-  std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/maps",
-                   .operation_id = "listMaps",
-                   .role = http::Role::read,
-                   .summary = "Floor plans, and the map and level on which each robot drives",
-                   .response_schema = "maps"},
-                  answered_by(list_maps)});
-  rows.push_back({{.method = Method::get,
-                   .path = path,
-                   .operation_id = "getFloorPlan",
-                   .role = http::Role::read,
-                   .summary = "The image of a floor plan",
-                   .response_type = "image/*",
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(get_plan)});
-  rows.push_back(
-      {{.method = Method::put,
-        .path = path,
-        .operation_id = "putFloorPlan",
-        .role = http::Role::admin,
-        .summary = "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its scale and "
-                   "origin as in a map.yaml of ROS",
-        .parameters = {{.name = "resolution_m",
-                        .type = http::Parameter::Type::number,
-                        .description = "side of a pixel of the image, m",
-                        .minimum = 1e-4,
-                        .maximum = 100,
-                        .required = true},
-                       number("origin_x_m", "the image's lower left corner in the map; 0 if absent", 1e6),
-                       number("origin_y_m", "the image's lower left corner in the map; 0 if absent", 1e6),
-                       number("origin_yaw_rad", "rotation of the image about that corner; 0 if absent", 7),
-                       {.name = "chargers",
-                        .type = http::Parameter::Type::text,
-                        .description = "places of chargers in the map, m, as x,y;x,y"}},
-        .request_types = {"image/png", "image/svg+xml"},
-        .max_body_bytes = most_plan_bytes,
-        .response_schema = "floor-plan",
-        .error_statuses = {413, 422},
-        .run = http::Run::write},
-       answered_by(put_plan)});
-  rows.push_back({{.method = Method::del,
-                   .path = path,
-                   .operation_id = "removeFloorPlan",
-                   .role = http::Role::admin,
-                   .summary = "Deletes the floor plan of a level",
-                   .response_schema = "robot-place",
-                   .error_statuses = {404, 422},
-                   .run = http::Run::write},
-                  answered_by(remove_plan)});
-  rows.push_back({{.method = Method::put,
-                   .path = "/v1/robots/{id}/place",
-                   .operation_id = "putRobotPlace",
-                   .role = http::Role::operate,
-                   .summary = "Sets the map and level on which a robot drives; its covariates map=NAME and "
-                              "level=NAME override them",
-                   .request_schema = "robot-place",
-                   .response_schema = "robot-place",
-                   .error_statuses = {404, 422},
-                   .run = http::Run::write},
-                  answered_by(put_place)});
+  Rows rows;
+  rows.add(Method::get, "/v1/maps", "listMaps", http::Role::read,
+           "Floor plans, and the map and level on which each robot drives", "maps", list_maps);
+  rows.add(Method::get, path, "getFloorPlan", http::Role::read, "The image of a floor plan", "", get_plan,
+           {.response_type = "image/*", .etag = true, .error_statuses = {404}});
+  rows.add(
+      Method::put, path, "putFloorPlan", http::Role::admin,
+      "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its scale and origin as in "
+      "a map.yaml of ROS",
+      "floor-plan", put_plan,
+      {.parameters = {{.name = "resolution_m",
+                       .type = http::Parameter::Type::number,
+                       .description = "side of a pixel of the image, m",
+                       .minimum = 1e-4,
+                       .maximum = 100,
+                       .required = true},
+                      number("origin_x_m", "the image's lower left corner in the map; 0 if absent", 1e6),
+                      number("origin_y_m", "the image's lower left corner in the map; 0 if absent", 1e6),
+                      number("origin_yaw_rad", "rotation of the image about that corner; 0 if absent", 7),
+                      {.name = "chargers", .description = "places of chargers in the map, m, as x,y;x,y"}},
+       .request_types = {"image/png", "image/svg+xml"},
+       .max_body_bytes = most_plan_bytes,
+       .error_statuses = {413, 422},
+       .run = http::Run::write});
+  rows.add(Method::del, path, "removeFloorPlan", http::Role::admin, "Deletes the floor plan of a level",
+           "robot-place", remove_plan, {.error_statuses = {404, 422}, .run = http::Run::write});
+  rows.add(
+      Method::put, "/v1/robots/{id}/place", "putRobotPlace", http::Role::operate,
+      "Sets the map and level on which a robot drives; its covariates map=NAME and level=NAME override them",
+      "robot-place", put_place,
+      {.request_schema = "robot-place", .error_statuses = {404, 422}, .run = http::Run::write});
   return {std::move(rows),
           {{"floor-plan", plan_table().schema()},
            {"maps", maps_table().schema()},

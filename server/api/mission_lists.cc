@@ -60,6 +60,7 @@ Result<history::MissionFilter> filter_of(const Request& request) {
 }
 
 std::vector<Parameter> filter_parameters() {
+  const auto& state_names = history::names_of<history::MissionState>;
   const auto bound = [](std::string name, std::string what, std::optional<double> minimum) {
     return Parameter{.name = std::move(name),
                      .type = Type::number,
@@ -70,38 +71,32 @@ std::vector<Parameter> filter_parameters() {
       with(time_parameters("from", "only missions that started at or after this time"),
            time_parameters("to", "only missions that started before this time"));
   return with(
-      times,
-      {
-          {.name = "robot_id",
-           .type = Type::text,
-           .description = "only missions of this robot, or of these, separated by commas"},
-          {.name = "mission_id", .type = Type::text, .description = "only missions that the robot called so"},
-          {.name = "name_contains",
-           .type = Type::text,
-           .description = "only missions with this text within mission_id; ASCII letters in any case"},
-          {.name = "state",
-           .type = Type::text,
-           .description = "only missions in this state",
-           .choices = {"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}},
-          {.name = "incomplete",
-           .type = Type::boolean,
-           .description = "only missions with (true) or without (false) unmeasured parts"},
-          bound("payload_min_kg", "at least this payload", 0),
-          bound("payload_max_kg", "at most this payload", 0),
-          bound("ratio_min", "at least this ratio of measured to modelled energy", std::nullopt),
-          bound("ratio_max", "at most this ratio of measured to modelled energy", std::nullopt),
-      });
+      times, {
+                 {.name = "robot_id",
+                  .description = "only missions of this robot, or of these, separated by commas"},
+                 {.name = "mission_id", .description = "only missions that the robot called so"},
+                 {.name = "name_contains",
+                  .description = "only missions with this text within mission_id; ASCII letters in any case"},
+                 {.name = "state",
+                  .description = "only missions in this state",
+                  .choices = {std::begin(state_names), std::end(state_names)}},
+                 {.name = "incomplete",
+                  .type = Type::boolean,
+                  .description = "only missions with (true) or without (false) unmeasured parts"},
+                 bound("payload_min_kg", "at least this payload", 0),
+                 bound("payload_max_kg", "at most this payload", 0),
+                 bound("ratio_min", "at least this ratio of measured to modelled energy", std::nullopt),
+                 bound("ratio_max", "at most this ratio of measured to modelled energy", std::nullopt),
+             });
 }
 
 std::vector<Parameter> sort_parameters() {
   std::vector<std::string> names;
   for (const auto& [name, order] : orders) names.emplace_back(name);
   return {{.name = "sort",
-           .type = Type::text,
            .description = "sort key, default start; missions without a value come last",
            .choices = std::move(names)},
           {.name = "order",
-           .type = Type::text,
            .description = "asc: least, oldest or first in the alphabet first; desc if absent",
            .choices = {"asc", "desc"}}};
 }
@@ -324,49 +319,34 @@ Result<Response> tariff(const Services& services, const Request&) {
 }  // namespace
 
 Part mission_list_part() {
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/missions",
-        .operation_id = "listMissions",
-        .role = http::Role::read,
-        .summary = "Missions, newest first or sorted, in pages that stay stable while missions come",
-        .parameters = with(with(filter_parameters(), sort_parameters()),
-                           {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
-        .response_schema = "mission-page",
-        .csv = true,
-        .rounded = true},
-       answered_by(list_missions)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/mission-totals",
-        .operation_id = "totalMissions",
-        .role = http::Role::read,
-        .summary = "Sums of energy and ledger over the selected missions, optionally by group",
-        .parameters = with(
-            filter_parameters(),
-            {{.name = "group_by",
-              .type = Type::text,
-              .description =
-                  "also the sums of each robot, day, week or kind of robot, or of each robot by day or week",
-              .choices = grouping_names()},
-             {.name = "utc_offset_min",
-              .type = Type::integer,
-              .description = "days begin at midnight, weeks on Monday, of a clock so many minutes ahead of "
-                             "UTC; 0 if absent",
-              .minimum = -1440,
-              .maximum = 1440}}),
-        .response_schema = "mission-totals",
-        .csv = true,
-        .rounded = true},
-       answered_by(totals)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/tariff",
-                   .operation_id = "getTariff",
-                   .role = http::Role::read,
-                   .summary = "Price and emissions of a kilowatt hour, by which the page values energy",
-                   .response_schema = "tariff"},
-                  answered_by(tariff)});
+  Rows rows;
+  rows.add(
+      Method::get, "/v1/missions", "listMissions", http::Role::read,
+      "Missions, newest first or sorted, in pages that stay stable while missions come", "mission-page",
+      list_missions,
+      {.parameters = with(with(filter_parameters(), sort_parameters()),
+                          {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
+       .csv = true,
+       .rounded = true});
+  rows.add(
+      Method::get, "/v1/mission-totals", "totalMissions", http::Role::read,
+      "Sums of energy and ledger over the selected missions, optionally by group", "mission-totals", totals,
+      {.parameters = with(
+           filter_parameters(),
+           {{.name = "group_by",
+             .description =
+                 "also the sums of each robot, day, week or kind of robot, or of each robot by day or week",
+             .choices = grouping_names()},
+            {.name = "utc_offset_min",
+             .type = Type::integer,
+             .description = "days begin at midnight, weeks on Monday, of a clock so many minutes ahead of "
+                            "UTC; 0 if absent",
+             .minimum = -1440,
+             .maximum = 1440}}),
+       .csv = true,
+       .rounded = true});
+  rows.add(Method::get, "/v1/tariff", "getTariff", http::Role::read,
+           "Price and emissions of a kilowatt hour, by which the page values energy", "tariff", tariff);
   return {std::move(rows),
           {{"tariff", tariff_table().schema()}, {"mission-totals", totals_answer_table().schema()}}};
 }

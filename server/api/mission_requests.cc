@@ -150,19 +150,16 @@ Result<Response> request_mission(Services& services, const Request& request) {
 }  // namespace
 
 Part mission_request_part() {
-  return {{{{.method = http::Method::post,
-             .path = "/v1/robots/{id}/missions",
-             .operation_id = "requestMission",
-             .role = http::Role::operate,
-             .summary =
-                 "Begins or ends a mission of a robot that does not announce missions. It begins and ends at "
-                 "the time of the robot's clock; samples before and after belong to no announced mission",
-             .request_schema = "mission-request",
-             .response_schema = "mission-requested",
-             .success_status = 202,
-             .error_statuses = {404, 409, 422},
-             .run = http::Run::write},
-            answered_by(request_mission)}},
+  Rows rows;
+  rows.add(http::Method::post, "/v1/robots/{id}/missions", "requestMission", http::Role::operate,
+           "Begins or ends a mission of a robot that does not announce missions. It begins and ends at the "
+           "time of the robot's clock; samples before and after belong to no announced mission",
+           "mission-requested", request_mission,
+           {.request_schema = "mission-request",
+            .success_status = 202,
+            .error_statuses = {404, 409, 422},
+            .run = http::Run::write});
+  return {std::move(rows),
           {{"mission-request", mission_event_input().schema()},
            {"mission-requested", requested_table().schema()}}};
 }

@@ -390,7 +390,7 @@ Part mission_part() {
   using Type = Parameter::Type;
   const std::vector<Parameter> span =
       with(time_parameters("from", "from this time on"), time_parameters("to", "before this time"));
-  std::vector<TableRow> rows;
+  Rows rows;
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}",
                    .operation_id = "getMission",
@@ -407,71 +407,43 @@ Part mission_part() {
                       return summaries->read(request);
                     };
                   }});
-  rows.push_back({{.method = Method::post,
-                   .path = "/v1/missions/{id}/annul",
-                   .operation_id = "annulMission",
-                   .role = http::Role::operate,
-                   .summary = "Excludes an ended mission from all sums and from training, with a reason that "
-                              "lists and the event log contain",
-                   .request_schema = "annul-request",
-                   .response_schema = "mission",
-                   .rounded = true,
-                   .error_statuses = {404, 409, 422},
-                   .run = http::Run::write},
-                  answered_by(annul)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/missions/{id}/ledger",
-                   .operation_id = "getMissionLedger",
-                   .role = http::Role::read,
-                   .summary = "Energy of a mission by term; the sum of the terms is the battery's energy",
-                   .response_schema = "mission-ledger",
-                   .csv = true,
-                   .rounded = true,
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(ledger)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/missions/{id}/trace",
-                   .operation_id = "getMissionTrace",
-                   .role = http::Role::read,
-                   .summary = "Power, speed, charge and position over a mission, as minimum, mean and "
-                              "maximum of equal intervals",
-                   .parameters = with(span, {{.name = "points",
-                                              .type = Type::integer,
-                                              .description = "largest number of intervals",
-                                              .minimum = 1,
-                                              .maximum = static_cast<double>(history::max_trace_points)}}),
-                   .response_schema = "mission-trace",
-                   .csv = true,
-                   .rounded = true,
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(trace)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/missions/{id}/telemetry",
-        .operation_id = "getMissionTelemetry",
-        .role = http::Role::read,
-        .summary = "The samples of a mission as received, within the retention",
-        .parameters = with(
-            span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor_parameter()}),
-        .response_schema = "mission-telemetry",
-        .csv = true,
-        .error_statuses = {404}},
-       answered_by(raw_telemetry)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/missions/{id}/covariates",
-        .operation_id = "getMissionCovariates",
-        .role = http::Role::read,
-        .summary = "Changes of a mission's covariates, within the retention",
-        .parameters = with(
-            span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor_parameter()}),
-        .response_schema = "mission-covariates",
-        .csv = true,
-        .etag = true,
-        .error_statuses = {404}},
-       answered_by(covariates)});
+  rows.add(Method::post, "/v1/missions/{id}/annul", "annulMission", http::Role::operate,
+           "Excludes an ended mission from all sums and from training, with a reason that lists and the "
+           "event log contain",
+           "mission", annul,
+           {.request_schema = "annul-request",
+            .rounded = true,
+            .error_statuses = {404, 409, 422},
+            .run = http::Run::write});
+  rows.add(Method::get, "/v1/missions/{id}/ledger", "getMissionLedger", http::Role::read,
+           "Energy of a mission by term; the sum of the terms is the battery's energy", "mission-ledger",
+           ledger, {.csv = true, .rounded = true, .etag = true, .error_statuses = {404}});
+  rows.add(
+      Method::get, "/v1/missions/{id}/trace", "getMissionTrace", http::Role::read,
+      "Power, speed, charge and position over a mission, as minimum, mean and maximum of equal intervals",
+      "mission-trace", trace,
+      {.parameters = with(span, {{.name = "points",
+                                  .type = Type::integer,
+                                  .description = "largest number of intervals",
+                                  .minimum = 1,
+                                  .maximum = static_cast<double>(history::max_trace_points)}}),
+       .csv = true,
+       .rounded = true,
+       .etag = true,
+       .error_statuses = {404}});
+  rows.add(Method::get, "/v1/missions/{id}/telemetry", "getMissionTelemetry", http::Role::read,
+           "The samples of a mission as received, within the retention", "mission-telemetry", raw_telemetry,
+           {.parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples),
+                                      cursor_parameter()}),
+            .csv = true,
+            .error_statuses = {404}});
+  rows.add(Method::get, "/v1/missions/{id}/covariates", "getMissionCovariates", http::Role::read,
+           "Changes of a mission's covariates, within the retention", "mission-covariates", covariates,
+           {.parameters = with(span, {limit_parameter("changes a page", history::max_telemetry_samples),
+                                      cursor_parameter()}),
+            .csv = true,
+            .etag = true,
+            .error_statuses = {404}});
   return {std::move(rows),
           {{"annul-request", annulment_input().schema()},
            {"mission", answers::mission_table().schema()},

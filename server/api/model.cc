@@ -360,60 +360,38 @@ Result<Response> all_proposals(const Services& services, const Request& request)
 
 Part model_part() {
   using Type = Parameter::Type;
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/robots/{id}/models",
-        .former_path = "/v1/robots/{id}/model",
-        .operation_id = "adoptModel",
-        .role = http::Role::operate,
-        .summary = "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
-                   "back-test on missions that it was not fitted on; or puts an earlier version in force",
-        .request_schema = "model-request",
-        .response_schema = "model-adoption",
-        .rounded = true,
-        .error_statuses = {404, 409, 422},
-        .run = http::Run::write},
-       answered_by(post_model)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}/models/diff",
-                   .former_path = "/v1/robots/{id}/versions/diff",
-                   .operation_id = "compareModels",
-                   .role = http::Role::read,
-                   .summary = "Differences between two versions of a robot's model",
-                   .parameters = {{.name = "from",
-                                   .type = Type::integer,
-                                   .description = "version before; default: the one that `to` was made from",
-                                   .minimum = 1},
-                                  {.name = "to",
-                                   .type = Type::integer,
-                                   .description = "version after; default: the one in force",
-                                   .minimum = 1}},
-                   .response_schema = "model-diff",
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(diff)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/robots/{id}/proposals",
-        .operation_id = "listProposals",
-        .role = http::Role::read,
-        .summary = "Model proposals for a robot, newest first",
-        .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
-        .response_schema = "proposal-list",
-        .csv = true,
-        .error_statuses = {404}},
-       answered_by(proposals)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/proposals",
-        .operation_id = "listFleetProposals",
-        .role = http::Role::read,
-        .summary = "Model proposals for the robots of the fleet, newest first",
-        .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
-        .response_schema = "proposal-list",
-        .csv = true},
-       answered_by(all_proposals)});
+  Rows rows;
+  rows.add(Method::post, "/v1/robots/{id}/models", "adoptModel", http::Role::operate,
+           "Adopts a robot file, a diagnosis or a proposal as the next model version, after a back-test on "
+           "missions that it was not fitted on; or puts an earlier version in force",
+           "model-adoption", post_model,
+           {.former_path = "/v1/robots/{id}/model",
+            .request_schema = "model-request",
+            .rounded = true,
+            .error_statuses = {404, 409, 422},
+            .run = http::Run::write});
+  rows.add(Method::get, "/v1/robots/{id}/models/diff", "compareModels", http::Role::read,
+           "Differences between two versions of a robot's model", "model-diff", diff,
+           {.former_path = "/v1/robots/{id}/versions/diff",
+            .parameters = {{.name = "from",
+                            .type = Type::integer,
+                            .description = "version before; default: the one that `to` was made from",
+                            .minimum = 1},
+                           {.name = "to",
+                            .type = Type::integer,
+                            .description = "version after; default: the one in force",
+                            .minimum = 1}},
+            .etag = true,
+            .error_statuses = {404}});
+  rows.add(Method::get, "/v1/robots/{id}/proposals", "listProposals", http::Role::read,
+           "Model proposals for a robot, newest first", "proposal-list", proposals,
+           {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
+            .csv = true,
+            .error_statuses = {404}});
+  rows.add(Method::get, "/v1/proposals", "listFleetProposals", http::Role::read,
+           "Model proposals for the robots of the fleet, newest first", "proposal-list", all_proposals,
+           {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
+            .csv = true});
   const described::Schema robot =
       described::with_words(described::of_type("string", true), "null in the list of the fleet");
   return {std::move(rows),

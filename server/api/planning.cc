@@ -304,7 +304,7 @@ Result<Response> matrix(const Services& services, const Request& r) {
 
 Part planning_part() {
   using http::Method;
-  std::vector<TableRow> rows;
+  Rows rows;
   rows.push_back(
       {{.method = Method::post,
         .path = "/v1/robots/{id}/profile",
@@ -326,58 +326,36 @@ Part planning_part() {
          answered_by(profile)(services, endpoint);
          endpoint.brief = [&services](Request& r) { return brief_profile(services, r); };
        }});
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/robots/{id}/estimate",
-        .operation_id = "estimateEnergy",
-        .role = http::Role::plan,
-        .summary = "Energy of a path driven by its minimum-energy motion (the default; independent of the "
-                   "robot's history) or its usual driving, or of a given motion",
-        .request_schema = "estimate-request",
-        .response_schema = "estimate",
-        .rounded = true,
-        .error_statuses = {404, 422},
-        .run = http::Run::compute},
-       answered_by(estimate)});
-  rows.push_back({{.method = Method::post,
-                   .path = "/v1/energy-matrix",
-                   .operation_id = "computeEnergyMatrix",
-                   .role = http::Role::plan,
-                   .summary = "Energy and duration of every task with every robot, one row per robot, for "
-                              "minimum-energy motions (the default; equal for equal robots, independent of "
-                              "their history) or each robot's usual driving",
-                   .request_schema = "energy-matrix-request",
-                   .response_schema = "energy-matrix",
-                   .error_statuses = {413, 422},
-                   .run = http::Run::compute},
-                  answered_by(matrix)});
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/robots/{id}/autonomy",
-        .operation_id = "computeAutonomy",
-        .role = http::Role::plan,
-        .summary =
-            "How far and how long a robot still goes, and whether it can do a list of tasks, driven as it "
-            "usually drives (the default: the charge must last for that) or by minimum-energy motions",
-        .request_schema = "autonomy-request",
-        .response_schema = "autonomy",
-        .rounded = true,
-        .error_statuses = {404, 422},
-        .run = http::Run::compute},
-       answered_by(autonomy)});
-  rows.push_back({{.method = Method::post,
-                   .path = "/v1/autonomy",
-                   .operation_id = "computeFleetAutonomy",
-                   .role = http::Role::plan,
-                   .summary = "The autonomy of many robots in one call",
-                   .request_schema = "fleet-autonomy-request",
-                   .response_schema = "fleet-autonomy",
-                   .rounded = true,
-                   .error_statuses = {422},
-                   .run = http::Run::compute},
-                  answered_by([](Services& services, const Request& r) {
-                    return fleet_autonomy_answer(*r.json, services, r.stop);
-                  })});
+  rows.add(Method::post, "/v1/robots/{id}/estimate", "estimateEnergy", http::Role::plan,
+           "Energy of a path driven by its minimum-energy motion (the default; independent of the robot's "
+           "history) or its usual driving, or of a given motion",
+           "estimate", estimate,
+           {.request_schema = "estimate-request",
+            .rounded = true,
+            .error_statuses = {404, 422},
+            .run = http::Run::compute});
+  rows.add(
+      Method::post, "/v1/energy-matrix", "computeEnergyMatrix", http::Role::plan,
+      "Energy and duration of every task with every robot, one row per robot, for minimum-energy motions "
+      "(the default; equal for equal robots, independent of their history) or each robot's usual driving",
+      "energy-matrix", matrix,
+      {.request_schema = "energy-matrix-request", .error_statuses = {413, 422}, .run = http::Run::compute});
+  rows.add(Method::post, "/v1/robots/{id}/autonomy", "computeAutonomy", http::Role::plan,
+           "How far and how long a robot still goes, and whether it can do a list of tasks, driven as it "
+           "usually drives (the default: the charge must last for that) or by minimum-energy motions",
+           "autonomy", autonomy,
+           {.request_schema = "autonomy-request",
+            .rounded = true,
+            .error_statuses = {404, 422},
+            .run = http::Run::compute});
+  rows.add(
+      Method::post, "/v1/autonomy", "computeFleetAutonomy", http::Role::plan,
+      "The autonomy of many robots in one call", "fleet-autonomy",
+      [](Services& services, const Request& r) { return fleet_autonomy_answer(*r.json, services, r.stop); },
+      {.request_schema = "fleet-autonomy-request",
+       .rounded = true,
+       .error_statuses = {422},
+       .run = http::Run::compute});
   return {std::move(rows), fleet_autonomy_schemas()};
 }
 

@@ -79,22 +79,17 @@ Result<Response> recent(const Services& services, const Request& request) {
 }  // namespace
 
 Part recent_value_part() {
-  std::vector<TableRow> rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/recent-values",
-                   .operation_id = "listRecentValues",
-                   .role = http::Role::read,
-                   .summary = "The last 90 s of robots' live values in columns, one a second, for charts "
-                              "that begin filled; kept in memory since the daemon's start",
-                   .parameters = {{.name = "robot_id",
-                                   .type = http::Parameter::Type::text,
-                                   .description = "only this robot, or these, separated by commas; a robot "
-                                                  "that was not heard has empty columns"},
-                                  limit_parameter("robots a page", max_recent_robots),
-                                  cursor_parameter()},
-                   .response_schema = "recent-values",
-                   .rounded = true},
-                  answered_by(recent)});
+  Rows rows;
+  rows.add(Method::get, "/v1/recent-values", "listRecentValues", http::Role::read,
+           "The last 90 s of robots' live values in columns, one a second, for charts that begin filled; "
+           "kept in memory since the daemon's start",
+           "recent-values", recent,
+           {.parameters = {{.name = "robot_id",
+                            .description = "only this robot, or these, separated by commas; a robot that was "
+                                           "not heard has empty columns"},
+                           limit_parameter("robots a page", max_recent_robots),
+                           cursor_parameter()},
+            .rounded = true});
   const described::Schema window =
       described::with_words(described::of_type("number"), "s, greatest age of the values");
   return {

@@ -122,7 +122,7 @@ const Table<ingest::ChargeView>& charging_table() {
   return table;
 }
 
-const Table<RobotSnapshot>& running_mission_table() {
+const Table<RobotSnapshot>& open_mission_table() {
   using S = RobotSnapshot;
   static const auto table =
       Table<S>()
@@ -176,7 +176,7 @@ const Table<RobotSnapshot>& counts_table() {
                    "model has their thermal resistance; otherwise null")
           .object(
               "mission", [](const S& s) { return s.mission_id.empty() ? nullptr : &s; },
-              "the running mission; null: none", running_mission_table())
+              "the open mission; null: none", open_mission_table())
           .value("samples", &S::samples, "samples accepted since the service started")
           .map("faults", &S::faults,
                "messages rejected or repaired since the daemon started, by reason. restart, gap and "

@@ -367,93 +367,42 @@ Result<Response> get_version(const Services& services, const Request& request) {
 }  // namespace
 
 Part robot_part() {
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/robots",
-        .operation_id = "listRobots",
-        .role = http::Role::read,
-        .summary =
-            "The fleet: every robot that has a model or has sent telemetry, by id, with its live state",
-        .parameters = {limit_parameter("robots a page", max_listed_robots), cursor_parameter()},
-        .response_schema = "robot-list",
-        .csv = true,
-        .rounded = true},
-       answered_by(list_robots)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}",
-                   .operation_id = "getRobot",
-                   .role = http::Role::read,
-                   .summary = "A robot's model in force",
-                   .response_schema = "robot-detail",
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(get_robot)});
-  rows.push_back({{.method = Method::post,
-                   .path = "/v1/robot-checks",
-                   .operation_id = "checkRobot",
-                   .role = http::Role::plan,
-                   .summary = "Reviews a robot file without storing it, as joulecast check does",
-                   .request_schema = "robot",
-                   .response_schema = "robot-check"},
-                  answered_by(check_file)});
-  rows.push_back(
-      {{.method = Method::put,
-        .path = "/v1/robots/{id}",
-        .operation_id = "putRobot",
-        .role = http::Role::admin,
-        .summary =
-            "Stores a robot's model; a changed model becomes a new version and takes effect immediately",
-        .request_schema = "robot",
-        .response_schema = "robot-version",
-        .error_statuses = {409, 422},
-        .run = http::Run::write},
-       answered_by(put)});
-  rows.push_back({{.method = Method::del,
-                   .path = "/v1/robots/{id}",
-                   .operation_id = "removeRobot",
-                   .role = http::Role::admin,
-                   .summary = "Removes a robot's model and ends its mission; with history=purge also deletes "
-                              "all its stored data except the event log",
-                   .parameters = {{.name = "history",
-                                   .type = http::Parameter::Type::text,
-                                   .description = "keep or purge the robot's missions and models",
-                                   .choices = {"keep", "purge"}}},
-                   .response_schema = "robot-removal",
-                   .error_statuses = {404, 409},
-                   .run = http::Run::write},
-                  answered_by(remove)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}/state",
-                   .operation_id = "getRobotState",
-                   .role = http::Role::read,
-                   .summary = "A robot's live state: power, charge, mission, health of its telemetry",
-                   .response_schema = "robot-state",
-                   .rounded = true,
-                   .error_statuses = {404},
-                   .run = http::Run::io},
-                  answered_by(state)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/robots/{id}/models",
-        .former_path = "/v1/robots/{id}/versions",
-        .operation_id = "listModels",
-        .role = http::Role::read,
-        .summary = "Every version of a robot's model, newest first",
-        .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
-        .response_schema = "model-list",
-        .etag = true,
-        .error_statuses = {404}},
-       answered_by(versions)});
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}/models/{version}",
-                   .operation_id = "getModel",
-                   .role = http::Role::read,
-                   .summary = "A version of a robot's model",
-                   .response_schema = "model",
-                   .etag = true,
-                   .error_statuses = {404}},
-                  answered_by(get_version)});
+  Rows rows;
+  rows.add(Method::get, "/v1/robots", "listRobots", http::Role::read,
+           "The fleet: every robot that has a model or has sent telemetry, by id, with its live state",
+           "robot-list", list_robots,
+           {.parameters = {limit_parameter("robots a page", max_listed_robots), cursor_parameter()},
+            .csv = true,
+            .rounded = true});
+  rows.add(Method::get, "/v1/robots/{id}", "getRobot", http::Role::read, "A robot's model in force",
+           "robot-detail", get_robot, {.etag = true, .error_statuses = {404}});
+  rows.add(Method::post, "/v1/robot-checks", "checkRobot", http::Role::plan,
+           "Reviews a robot file without storing it, as joulecast check does", "robot-check", check_file,
+           {.request_schema = "robot"});
+  rows.add(Method::put, "/v1/robots/{id}", "putRobot", http::Role::admin,
+           "Stores a robot's model; a changed model becomes a new version and takes effect immediately",
+           "robot-version", put,
+           {.request_schema = "robot", .error_statuses = {409, 422}, .run = http::Run::write});
+  rows.add(Method::del, "/v1/robots/{id}", "removeRobot", http::Role::admin,
+           "Removes a robot's model and ends its mission; with history=purge also deletes all its stored "
+           "data except the event log",
+           "robot-removal", remove,
+           {.parameters = {{.name = "history",
+                            .description = "keep or purge the robot's missions and models",
+                            .choices = {"keep", "purge"}}},
+            .error_statuses = {404, 409},
+            .run = http::Run::write});
+  rows.add(Method::get, "/v1/robots/{id}/state", "getRobotState", http::Role::read,
+           "A robot's live state: power, charge, mission, health of its telemetry", "robot-state", state,
+           {.rounded = true, .error_statuses = {404}, .run = http::Run::io});
+  rows.add(Method::get, "/v1/robots/{id}/models", "listModels", http::Role::read,
+           "Every version of a robot's model, newest first", "model-list", versions,
+           {.former_path = "/v1/robots/{id}/versions",
+            .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
+            .etag = true,
+            .error_statuses = {404}});
+  rows.add(Method::get, "/v1/robots/{id}/models/{version}", "getModel", http::Role::read,
+           "A version of a robot's model", "model", get_version, {.etag = true, .error_statuses = {404}});
   using described::of_page;
   const described::Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
   return {std::move(rows),

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <charconv>
-#include <deque>
 #include <iterator>
 #include <string>
 #include <string_view>
@@ -16,12 +15,15 @@
 #include "answers/json/mission_json.h"
 #include "answers/json/profile_json.h"
 #include "gap/verdict/diagnosis_json.h"
+#include "robot/robot_schema.h"
 #include "server/api/common_parameters.h"
 #include "server/api/requests.h"
 #include "server/api/robot_json.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/gate.h"
+#include "server/http/openapi.h"
 #include "server/http/operations.h"
+#include "server/http/problem.h"
 
 namespace joulecast::api {
 namespace {
@@ -36,7 +38,7 @@ constexpr std::pair<const char*, Part (*)()> parts[] = {
 std::vector<TableRow> table() {
   std::vector<TableRow> all;
   for (const auto& [tag, part] : parts) {
-    std::vector<TableRow> rows = part().rows;
+    Rows rows = part().rows;
     for (TableRow& row : rows) {
       row.endpoint.tag = tag;
       if (row.endpoint.rounded) row.endpoint.parameters.push_back(digits_parameter());
@@ -45,37 +47,6 @@ std::vector<TableRow> table() {
   }
   return all;
 }
-
-// Texts that last as long as the program.
-struct Described {
-  Described() {
-    described::Schemas made{{"accounts", answers::accounts_table().schema()},
-                            {"back-test", server::back_test_table().schema()},
-                            {"contradiction", contradiction_table().schema()},
-                            {"contradiction-event", contradiction_event_table().schema()},
-                            {"ledger", answers::ledger_table().schema()},
-                            {"reset-event", described::of_object("Events were lost: read the state again", {},
-                                                                 described::Schema::object())}};
-    const auto add = [&made](const described::Schemas& more) {
-      made.insert(made.end(), more.begin(), more.end());
-    };
-    for (const auto& schemas_of :
-         {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
-          answers::profile_schemas, answers::estimate_schemas, gap::diagnosis_schemas,
-          http::operations_schemas, http::session_schemas, request_schemas})
-      add(schemas_of());
-    for (const auto& [tag, part] : parts) add(part().schemas);
-    for (const auto& [name, schema] : made) {
-      const std::string& file = texts.emplace_back(name + ".schema.json");
-      files.push_back({file, texts.emplace_back(schema.dump())});
-    }
-    const auto embedded = embedded_schemas();
-    files.insert(files.end(), embedded.begin(), embedded.end());
-  }
-
-  std::deque<std::string> texts;
-  std::vector<EmbeddedFile> files;
-};
 
 }  // namespace
 
@@ -103,9 +74,26 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
               "robot " + robot_id + " publishes telemetry but has no model yet: PUT /v1/robots/" + robot_id);
 }
 
-std::span<const EmbeddedFile> schemas() {
-  static const Described described;
-  return described.files;
+described::Schemas schemas() {
+  described::Schemas all{{"accounts", answers::accounts_table().schema()},
+                         {"back-test", server::back_test_table().schema()},
+                         {"contradiction", contradiction_table().schema()},
+                         {"contradiction-event", contradiction_event_table().schema()},
+                         {"ledger", answers::ledger_table().schema()},
+                         {"openapi", http::openapi_schema()},
+                         {"problem", http::problem_schema()},
+                         {"robot", robot::robot_schema()},
+                         {"reset-event", described::of_object("Events were lost: read the state again", {},
+                                                              described::Schema::object())}};
+  const auto add = [&all](const described::Schemas& more) {
+    all.insert(all.end(), more.begin(), more.end());
+  };
+  for (const auto& schemas_of : {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
+                                 answers::profile_schemas, answers::estimate_schemas, gap::diagnosis_schemas,
+                                 http::operations_schemas, http::session_schemas, request_schemas})
+    add(schemas_of());
+  for (const auto& [tag, part] : parts) add(part().schemas);
+  return all;
 }
 
 history::Past past_of(const Services& services, const http::Request& request) {

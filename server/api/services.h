@@ -2,7 +2,8 @@
 
 #include <cstdint>
 #include <functional>
-#include <span>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "describe/schema.h"
@@ -20,7 +21,6 @@
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/model_adoption.h"
-#include "server/embedded.h"
 #include "server/http/router.h"
 
 namespace joulecast::api {
@@ -69,16 +69,32 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
   };
 }
 
+// The table of the endpoints of a file: what each of them has, the function that answers it, and the other
+// members of its row.
+struct Rows : std::vector<TableRow> {
+  template <class Answer>
+  void add(http::Method method, std::string path, std::string operation_id, http::Role role,
+           std::string summary, std::string response_schema, Answer answer, http::Endpoint row = {}) {
+    row.method = method;
+    row.path = std::move(path);
+    row.operation_id = std::move(operation_id);
+    row.role = role;
+    row.summary = std::move(summary);
+    row.response_schema = std::move(response_schema);
+    push_back({std::move(row), answered_by(answer)});
+  }
+};
+
 // All endpoints of the API, except those of operations (server/http).
 std::vector<http::Endpoint> endpoints(Services& services);
 // The same without handlers, for generated documents.
 std::vector<http::Endpoint> described_endpoints();
-// The schemas of all endpoints, each as NAME.schema.json.
-std::span<const EmbeddedFile> schemas();
+// The schemas of all endpoints.
+described::Schemas schemas();
 
 // The endpoints of each file, and the schemas that its tables make.
 struct Part {
-  std::vector<TableRow> rows;
+  Rows rows;
   described::Schemas schemas = {};
 };
 Part robot_part();

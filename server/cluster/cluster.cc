@@ -167,14 +167,13 @@ class Cluster::Impl {
     }
     const Result<bool> buried = bury(state);
     if (!buried || *buried) return buried;
-    const Result<std::size_t> taken = reassign(state);
-    if (!taken) return tl::unexpected(taken.error());
+    TRY_ASSIGN(const std::size_t taken, reassign(state));
     {
       const std::lock_guard lock(mutex_);
       if (settling_) {
-        settled_ = *taken == 0 && gone_since_.empty();
+        settled_ = taken == 0 && gone_since_.empty();
         wake_.notify_all();
-        return *taken > 0;
+        return taken > 0;
       }
     }
     return take_jobs().map([] { return false; });

@@ -36,7 +36,7 @@ struct StoredRecording {
 // Missions that were looked at and not taken, by reason; and samples of those that were.
 struct LeftOut {
   std::size_t excepted = 0;
-  std::size_t open = 0;          // still running
+  std::size_t open = 0;          // still
   std::size_t no_telemetry = 0;  // the retention dropped it
   std::size_t contradicted = 0;  // its channels contradict each other; not if it was requested by name
   std::size_t annulled = 0;

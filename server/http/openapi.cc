@@ -30,12 +30,12 @@ std::string lower_name(Method method) {
 
 class Components {
  public:
-  explicit Components(std::span<const EmbeddedFile> files) : files_(files) {}
+  explicit Components(const described::Schemas& all) : all_(all) {}
 
-  // {"$ref": ...} to the component of schemas/<name>.schema.json, which is taken in with all it refers to.
+  // {"$ref": ...} to the component of that name, which is taken in with all it refers to.
   Result<ordered_json> reference(const std::string& name) {
     TRY(add(name));
-    return ordered_json{{"$ref", "#/components/schemas/" + name}};
+    return ordered_json{{"$ref", prefix_ + name}};
   }
   ordered_json take() {
     ordered_json sorted = ordered_json::object();
@@ -46,61 +46,37 @@ class Components {
  private:
   Result<void> add(const std::string& name) {
     if (schemas_.contains(name)) return {};
-    const auto file = std::find_if(files_.begin(), files_.end(), [&](const EmbeddedFile& each) {
-      return each.name == name + std::string(suffix);
-    });
-    if (file == files_.end())
-      return fail(Fault::internal, name, "there is no schemas/" + name + std::string(suffix));
-    if (auto strict = parse_json(file->bytes); !strict)
-      return fail(Fault::internal, std::string(file->name), describe(strict.error()));
-    ordered_json schema = ordered_json::parse(file->bytes);  // keeps the file's order of keys
-    // As components the schemas are parts of one document: their own identity would make references resolve
-    // elsewhere.
-    schema.erase("$schema");
-    schema.erase("$id");
+    const auto found = std::ranges::find(all_, name, &described::Schemas::value_type::first);
+    if (found == all_.end()) return fail(Fault::internal, name, "there is no schema of this name");
+    ordered_json schema = found->second;
     schemas_.emplace(name, ordered_json());  // ends recursion between schemas that refer to each other
     TRY(rebase(schema, name));
-    // Generators of clients support components, not definitions within them.
-    if (const auto definitions = schema.find("$defs"); definitions != schema.end()) {
-      for (auto& [inner, definition] : definitions->items())
-        schemas_[name + "." + inner] = std::move(definition);
-      schema.erase("$defs");
-    }
     schemas_[name] = std::move(schema);
     return {};
   }
 
-  // "#/$defs/x" of <name> is the component "<name>.x"; "other.schema.json#/..." likewise under other.
+  // References to other schemas (NAME.schema.json) and within this one (#/...) become those of the document.
   Result<void> rebase(ordered_json& node, const std::string& name) {
-    if (node.is_array()) {
-      for (auto& each : node) TRY(rebase(each, name));
-      return {};
-    }
-    if (!node.is_object()) return {};
+    if (!node.is_structured()) return {};
     for (auto& [key, value] : node.items()) {
       if (key != "$ref" || !value.is_string()) {
         TRY(rebase(value, name));
         continue;
       }
-      const std::string reference = value.get<std::string>();
-      const auto hash = reference.find('#');
-      std::string file = reference.substr(0, hash);
-      std::string rest = hash == std::string::npos ? "" : reference.substr(hash + 1);
-      constexpr std::string_view definitions = "/$defs/";
-      if (rest.starts_with(definitions)) rest.replace(0, definitions.size(), ".");
-      if (!file.empty()) {
-        if (!file.ends_with(suffix))
-          return fail(Fault::internal, name, "cannot follow the reference " + reference);
-        file.resize(file.size() - suffix.size());
-        if (const auto slash = file.rfind('/'); slash != std::string::npos) file.erase(0, slash + 1);
-        TRY(add(file));
+      std::string target = value.get<std::string>();
+      if (target.ends_with(suffix)) {
+        target.resize(target.size() - suffix.size());
+        TRY(add(target));
+      } else {
+        target.replace(0, 1, name);
       }
-      value = "#/components/schemas/" + (file.empty() ? name : file) + rest;
+      value = prefix_ + target;
     }
     return {};
   }
 
-  std::span<const EmbeddedFile> files_;
+  static inline const std::string prefix_ = "#/components/schemas/";
+  const described::Schemas& all_;
   std::map<std::string, ordered_json> schemas_;
 };
 
@@ -236,7 +212,7 @@ ordered_json security_schemes() {
 // The contents of a document: the table's rows become paths one by one.
 class Document {
  public:
-  Document(std::span<const EmbeddedFile> schemas, std::span<const EmbeddedFile> examples)
+  Document(const described::Schemas& schemas, std::span<const EmbeddedFile> examples)
       : components_(schemas), examples_(examples) {}
 
   Result<void> add(const Endpoint& endpoint) {
@@ -347,7 +323,22 @@ class Document {
 
 }  // namespace
 
-Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<const EmbeddedFile> schemas,
+described::Schema openapi_schema() {
+  const auto member = [](const char* type, const char* words) {
+    return described::with_words(described::of_type(type), words);
+  };
+  described::Schema version = member("string", "version of OpenAPI");
+  version["pattern"] = R"(^3\.1\.)";
+  return described::of_object("An OpenAPI 3.1 document", {},
+                              {{"openapi", std::move(version)},
+                               {"info", member("object", "name and version of the service")},
+                               {"servers", member("array", "where the service is")},
+                               {"tags", member("array", "groups of endpoints")},
+                               {"paths", member("object", "the endpoints")},
+                               {"components", member("object", "schemas, problems and ways to sign in")}});
+}
+
+Result<std::string> openapi_document(std::span<const Endpoint> given, const described::Schemas& schemas,
                                      std::span<const EmbeddedFile> examples) {
   std::vector<Endpoint> endpoints(given.begin(), given.end());
   endpoints.push_back(self_endpoint(nullptr));
@@ -357,8 +348,7 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
   return document.text();
 }
 
-Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
-                                           std::span<const EmbeddedFile> schemas,
+Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints, const described::Schemas& schemas,
                                            std::span<const EmbeddedFile> examples) {
   TRY_ASSIGN(std::string document, openapi_document(endpoints, schemas, examples));
   endpoints.push_back(

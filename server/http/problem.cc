@@ -1,7 +1,10 @@
 #include "server/http/problem.h"
 
+#include <cstdint>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "describe/table.h"
 
 namespace joulecast::http {
 namespace {
@@ -21,7 +24,39 @@ Answer answer_to(Fault fault) {
   return answers.at(fault);
 }
 
+// A problem document. Absent members are left out.
+struct Problem {
+  std::string type;
+  std::string_view title;
+  std::uint64_t status;
+  std::string_view detail;
+  std::optional<std::string> instance = {};
+  std::optional<std::string_view> request_id = {}, field = {}, constraint = {};
+};
+
+const described::Table<Problem>& problem_table() {
+  using P = Problem;
+  static const auto table =
+      described::Table<P>("Problem document, RFC 9457")
+          .value("type", &P::type, "urn:joulecast:problem:<kind>")
+          .value("title", &P::title, "the status in words")
+          .value("status", &P::status, "status of the answer", {{"minimum", 400}, {"maximum", 599}})
+          .value("detail", &P::detail, "description of the error in this request")
+          .known("instance", &P::instance, "urn:joulecast:request:<request id>")
+          .known("request_id", &P::request_id, "the id under which the service logged the request")
+          .known("field", &P::field,
+                 "JSON pointer into the body (begins with /), or the name of a query or path parameter or of "
+                 "a header")
+          .known("constraint", &P::constraint, "the violated constraint, with value and bound")
+          .elsewhere("back_test", described::of_reference("back-test"), "back-test of a rejected adoption");
+  return table;
+}
+
 }  // namespace
+
+described::Schema problem_schema() {
+  return problem_table().schema();
+}
 
 unsigned status_of(Fault fault) {
   return answer_to(fault).status;
@@ -46,22 +81,21 @@ std::string_view reason_phrase(unsigned status) {
 
 Response problem(unsigned status, std::string_view slug, std::string_view detail, std::string_view request_id,
                  std::string_view field, std::string_view constraint) {
-  nlohmann::ordered_json document;
-  document["type"] = "urn:joulecast:problem:" + std::string(slug);
-  document["title"] = reason_phrase(status);
-  document["status"] = status;
-  document["detail"] = detail;
+  Problem document{.type = "urn:joulecast:problem:" + std::string(slug),
+                   .title = reason_phrase(status),
+                   .status = status,
+                   .detail = detail};
   if (!request_id.empty()) {
-    document["instance"] = "urn:joulecast:request:" + std::string(request_id);
-    document["request_id"] = request_id;
+    document.instance = "urn:joulecast:request:" + std::string(request_id);
+    document.request_id = request_id;
   }
-  if (!field.empty()) document["field"] = field;
-  if (!constraint.empty()) document["constraint"] = constraint;
+  if (!field.empty()) document.field = field;
+  if (!constraint.empty()) document.constraint = constraint;
   Response response;
   response.status = status;
   response.content_type = "application/problem+json";
   // Messages can quote the client's input, which need not be UTF-8.
-  response.body = document.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  response.body = problem_table().document(document).dump();
   if (status == 429 || status == 503) response.headers.emplace_back("Retry-After", "1");
   return response;
 }

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "describe/schema.h"
 #include "server/http/message.h"
 
 namespace joulecast::http {
@@ -17,10 +18,10 @@ unsigned status_of(Fault fault);
 
 std::string_view reason_phrase(unsigned status);
 
-// RFC 9457 document: type ("urn:joulecast:problem:<slug>"), title, status, detail, instance (the request id
-// as urn:joulecast:request:<id>), and our members request_id, field and constraint. `field` is a JSON pointer
-// into the body, or the bare name of a query or path parameter or of a header; it and `constraint` are left
-// out when empty. Answers of status 429 and 503 carry Retry-After.
+described::Schema problem_schema();
+
+// RFC 9457 document; `request_id`, `field` and `constraint` are left out when empty. Answers of status 429
+// and 503 carry Retry-After.
 Response problem(unsigned status, std::string_view slug, std::string_view detail, std::string_view request_id,
                  std::string_view field = {}, std::string_view constraint = {});
 

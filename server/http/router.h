@@ -40,7 +40,7 @@ struct Parameter {
 // One kind of event of an event stream, for documents.
 struct EventKind {
   std::string name;
-  std::string schema;  // name of schemas/<name>.schema.json, of its data
+  std::string schema;  // name of the schema of its data
   std::string description;
 };
 
@@ -55,7 +55,7 @@ struct Endpoint {
   std::string tag = {};           // group that documents list it in, one of openapi.cc's
   std::string summary = {};
   std::vector<Parameter> parameters = {};
-  std::string request_schema = {};  // name of schemas/<name>.schema.json; empty when there is no body
+  std::string request_schema = {};                   // its name; empty when there is no body
   std::vector<std::string> request_types = {};       // media types of a body that is not JSON
   std::optional<std::uint64_t> max_body_bytes = {};  // none: http.max_body_bytes
   std::string response_schema = {};                  // likewise; empty when the answer is not JSON

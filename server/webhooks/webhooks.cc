@@ -53,7 +53,7 @@ Result<Webhook> read_webhook(const Json& value, const std::string& at, const std
   const std::string url = fields.text("url", longest_text);
   const std::string secret_file = fields.text("secret_file", longest_text);
   read_events(fields, webhook.events);
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   TRY_ASSIGN(auto address, http_client::parse_url(url, at + "/url"));
   webhook.host = address.host + ':' + address.port;
   webhook.address = std::move(address);

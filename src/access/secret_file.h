@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/try.h"
 
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
@@ -38,12 +39,10 @@ Result<void> change_secret_file(const std::string& path, Result<Content> (*read)
                                 std::string (*text_of)(const Content&),
                                 const std::function<Result<void>(Content&)>& change) {
   FileReplacement replacement(path);
-  const Result<bool> exists = replacement.begin();
-  if (!exists) return tl::unexpected(exists.error());
-  Result<Content> content = *exists ? read(path) : Content{};
-  if (!content) return tl::unexpected(content.error());
-  if (Result<void> changed = change(*content); !changed) return changed;
-  return replacement.commit(text_of(*content));
+  TRY_ASSIGN(const bool exists, replacement.begin());
+  TRY_ASSIGN(Content content, exists ? read(path) : Content{});
+  if (Result<void> changed = change(content); !changed) return changed;
+  return replacement.commit(text_of(content));
 }
 
 }  // namespace joulecast::access

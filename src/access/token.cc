@@ -74,10 +74,9 @@ Result<void> check_token_name(std::string_view name) {
 }
 
 Result<std::vector<Token>> parse_tokens(std::string_view json_text) {
-  const auto list = read_list(json_text, "tokens");
-  if (!list) return tl::unexpected(list.error());
+  TRY_ASSIGN(const auto list, read_list(json_text, "tokens"));
   std::vector<Token> tokens;
-  for (const Json& each : *list) {
+  for (const Json& each : list) {
     const std::string at = "/tokens/" + std::to_string(tokens.size());
     Result<Token> token = read_token(each, at);
     if (!token) return tl::unexpected(std::move(token.error()));
@@ -102,9 +101,8 @@ std::string to_json_text(const std::vector<Token>& tokens) {
 }
 
 Result<std::vector<Token>> read_tokens(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::unexpected(text.error());
-  Result<std::vector<Token>> tokens = parse_tokens(*text);
+  TRY_ASSIGN(const std::string text, read_text_file(path));
+  Result<std::vector<Token>> tokens = parse_tokens(text);
   if (!tokens) return invalid(path, describe(tokens.error()));
   return tokens;
 }

@@ -524,17 +524,16 @@ Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
   TRY_ASSIGN(const auto data, power_windows(missions, robot));
   TRY_ASSIGN(const auto parameters,
              PowerParameters::make(robot, scale_of(data.windows), options.resistance_known));
-  const auto found = find(
-      parameters, data, [](std::size_t) { return true; }, robot);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto found, find(
+                                   parameters, data, [](std::size_t) { return true; }, robot));
   if (options.progress) options.progress(0.4);
   TRY_ASSIGN(const auto halves, predict_halves(parameters, data, robot));
   PowerCalibration out;
-  out.robot = found->parameters.robot(found->fit.x);
+  out.robot = found.parameters.robot(found.fit.x);
   out.halves = halves;
-  out.estimates = power_estimates(found->parameters, found->fit, found->free);
-  out.untold = untold_parameters(found->parameters, found->fit);
-  tell_extent(data, *found, out);
+  out.estimates = power_estimates(found.parameters, found.fit, found.free);
+  out.untold = untold_parameters(found.parameters, found.fit);
+  tell_extent(data, found, out);
   return out;
 }
 

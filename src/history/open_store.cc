@@ -124,11 +124,11 @@ Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_
 Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenMode mode, bool or_older) {
   auto database = connect_file(path, mode);
   if (!database) return database;
-  const auto version =
-      guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path);
-  if (!version) return tl::unexpected(version.error());
-  if (or_older && *version < store_schema().version) return database;
-  TRY(check_version(path, *version, store_schema()));
+  TRY_ASSIGN(
+      const auto version,
+      guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path));
+  if (or_older && version < store_schema().version) return database;
+  TRY(check_version(path, version, store_schema()));
   return database;
 }
 

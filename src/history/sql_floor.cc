@@ -171,17 +171,16 @@ Result<FloorReading> Store::floor_visits(const MissionFilter& filter, double cel
                                          const FloorSink& sink) const {
   if (!(cell_m >= least_floor_cell_m && cell_m <= greatest_floor_cell_m))
     return invalid("cell_m", "must be 0.1 to 100");
-  const auto choice = read([&](Database& database) { return floor_missions(database, filter, max_points); });
-  if (!choice) return tl::unexpected(choice.error());
-  FloorReading reading{.missions = choice->missions};
+  TRY_ASSIGN(const auto choice,
+             read([&](Database& database) { return floor_missions(database, filter, max_points); }));
+  FloorReading reading{.missions = choice.missions};
   // Each part separately, so that a part read again after a lost connection reaches the sink once.
-  for (std::span rest(choice->chosen); !rest.empty();) {
+  for (std::span rest(choice.chosen); !rest.empty();) {
     const auto part = rest.first(next_at_once(rest));
-    const auto sums = read([&](Database& database) { return floor_sums(database, part, cell_m); });
-    if (!sums) return tl::unexpected(sums.error());
-    reading.points += sums->points;
+    TRY_ASSIGN(const auto sums, read([&](Database& database) { return floor_sums(database, part, cell_m); }));
+    reading.points += sums.points;
     for (std::size_t k = 0; k < part.size(); ++k, ++reading.missions_read)
-      if (!sink({part[k].key, part[k].robot_id, sums->visits[k]})) return reading;
+      if (!sink({part[k].key, part[k].robot_id, sums.visits[k]})) return reading;
     rest = rest.subspan(part.size());
   }
   return reading;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/try.h"
 #include "history/columns.h"
 #include "history/sql.h"
 
@@ -100,9 +101,8 @@ template <class T>
 Result<std::vector<T>> read_all(Rows& rows, Result<T> (*read)(Rows&) = read_record<T>) {
   std::vector<T> all;
   while (rows.next()) {
-    Result<T> one = read(rows);
-    if (!one) return tl::unexpected(one.error());
-    all.push_back(std::move(*one));
+    TRY_ASSIGN(T one, read(rows));
+    all.push_back(std::move(one));
   }
   return all;
 }

@@ -11,6 +11,7 @@
 
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
+#include "base/try.h"
 #include "signals/energy_state.h"
 
 namespace joulecast::ingest {
@@ -39,9 +40,8 @@ class IngestService::Impl {
   Result<void> start() {
     if (Result<void> keys = signatures_.read_keys(); !keys) return keys;
     if (Result<void> recovered = pipeline_.recover(); !recovered) return recovered;
-    Result<telemetry::LcmLink> link = telemetry::LcmLink::open(options_.lcm_url);
-    if (!link) return tl::unexpected(std::move(link.error()));
-    link_ = std::make_unique<telemetry::LcmLink>(std::move(*link));
+    TRY_ASSIGN(telemetry::LcmLink link, telemetry::LcmLink::open(options_.lcm_url));
+    link_ = std::make_unique<telemetry::LcmLink>(std::move(link));
     const auto handler = [this](const telemetry::Received& received) {
       survive("receiving", [&] {
         std::optional<InboundMessage> message =

@@ -5,6 +5,7 @@
 namespace joulecast::robot {
 namespace {
 
+constexpr Bounds any;
 constexpr Bounds above(double low, double high) {
   return {low, high, true, false};
 }
@@ -15,77 +16,96 @@ constexpr Bounds below_end(double low, double high) {
   return {low, high, false, true};
 }
 
-// One entry of the table: the member is reached through a captureless function of the model.
-#define JOULECAST_MEMBER(path) +[](RobotModel& m) -> decltype((m.path)) { return m.path; }
+// Pointer and member of an entry: the member is reached through a captureless function of the model.
+#define AT(pointer, path) "/" pointer, +[](RobotModel& m) -> decltype((m.path)) { return m.path; }
+#define FIELD(name) AT(#name, name)
+#define FIELD_OF(object, name) AT(#object "/" #name, object.name)
 
 // The ends are those of ground robots with a margin of orders of magnitude: they catch units mixed up
 // (millimetres, grams, watt-hours) and signs, not unusual designs.
 const Field table[] = {
-    {"/robot_id", JOULECAST_MEMBER(robot_id)},
-
-    {"/kinematics/wheel_radius_m", JOULECAST_MEMBER(kinematics.wheel_radius_m), above(0, 2)},
-    {"/kinematics/half_track_m", JOULECAST_MEMBER(kinematics.half_track_m), above(0, 5)},
-    {"/kinematics/com_offset_m", JOULECAST_MEMBER(kinematics.com_offset_m), within(-5, 5),
-     Presence::optional},
-
-    {"/mass/chassis_kg", JOULECAST_MEMBER(mass.chassis_kg), above(0, 1e5)},
-    {"/mass/wheel_kg", JOULECAST_MEMBER(mass.wheel_kg), within(0, 1e4)},
-    {"/mass/yaw_inertia_kg_m2", JOULECAST_MEMBER(mass.yaw_inertia_kg_m2), above(0, 1e6)},
-    {"/mass/wheel_inertia_kg_m2", JOULECAST_MEMBER(mass.wheel_inertia_kg_m2), within(0, 1e4)},
-
-    {"/motor/resistance_ohm", JOULECAST_MEMBER(motor.resistance_ohm), above(0, 1e3)},
-    {"/motor/inductance_h", JOULECAST_MEMBER(motor.inductance_h), within(0, 10), Presence::optional},
-    {"/motor/torque_constant_nm_a", JOULECAST_MEMBER(motor.torque_constant_nm_a), above(0, 1e3)},
-    {"/motor/voltage_constant_v_s_rad", JOULECAST_MEMBER(motor.voltage_constant_v_s_rad), above(0, 1e3)},
-    {"/motor/gear_ratio", JOULECAST_MEMBER(motor.gear_ratio), above(0, 1e4), Presence::optional},
-    {"/motor/rotor_inertia_kg_m2", JOULECAST_MEMBER(motor.rotor_inertia_kg_m2), within(0, 1e4),
-     Presence::optional},
-    {"/motor/viscous_friction_nm_s_rad", JOULECAST_MEMBER(motor.viscous_friction_nm_s_rad), within(0, 1e4)},
-    {"/motor/friction_torque_nm", JOULECAST_MEMBER(motor.friction_torque_nm), within(0, 1e4)},
-
-    {"/battery/nominal_voltage_v", JOULECAST_MEMBER(battery.nominal_voltage_v), above(0, 2e3)},
-    {"/battery/capacity_ah", JOULECAST_MEMBER(battery.capacity_ah), above(0, 1e5)},
-    {"/battery/internal_resistance_ohm", JOULECAST_MEMBER(battery.internal_resistance_ohm), within(0, 100)},
-    {"/battery/reserve_fraction", JOULECAST_MEMBER(battery.reserve_fraction), below_end(0, 1)},
-    {"/battery/open_circuit_voltage", JOULECAST_MEMBER(battery.open_circuit_voltage), above(0, 4e3),
-     Presence::optional, "voltage_v"},
-    {"/battery/resistance_curve", JOULECAST_MEMBER(battery.resistance_curve), within(0, 100),
+    {FIELD(robot_id), any, "as in its telemetry"},
+    {FIELD_OF(kinematics, wheel_radius_m), above(0, 2), "of a driven wheel under load"},
+    {FIELD_OF(kinematics, half_track_m), above(0, 5), "half the distance between the wheels"},
+    {FIELD_OF(kinematics, com_offset_m), within(-5, 5),
+     "centre of mass ahead of the axle; negative is behind", Presence::optional},
+    {FIELD_OF(mass, chassis_kg), above(0, 1e5), "without wheels, rotors and payload"},
+    {FIELD_OF(mass, wheel_kg), within(0, 1e4), "one wheel with its rotor"},
+    {FIELD_OF(mass, yaw_inertia_kg_m2), above(0, 1e6),
+     "whole robot without payload, about the vertical through the axle's middle"},
+    {FIELD_OF(mass, wheel_inertia_kg_m2), within(0, 1e4), "one wheel about its axle"},
+    {FIELD_OF(motor, resistance_ohm), above(0, 1e3), "of one armature"},
+    {FIELD_OF(motor, inductance_h), within(0, 10), "of one armature", Presence::optional},
+    {FIELD_OF(motor, torque_constant_nm_a), above(0, 1e3), "at the motor shaft"},
+    {FIELD_OF(motor, voltage_constant_v_s_rad), above(0, 1e3), "at the motor shaft"},
+    {FIELD_OF(motor, gear_ratio), above(0, 1e4), "motor turns for one turn of the wheel", Presence::optional},
+    {FIELD_OF(motor, rotor_inertia_kg_m2), within(0, 1e4), "seen at the wheel", Presence::optional},
+    {FIELD_OF(motor, viscous_friction_nm_s_rad), within(0, 1e4), "at the wheel"},
+    {FIELD_OF(motor, friction_torque_nm), within(0, 1e4), "at the wheel, opposing motion, [right, left]"},
+    {FIELD_OF(battery, nominal_voltage_v), above(0, 2e3),
+     "nominal voltage of the battery; upper limit of the motor voltage"},
+    {FIELD_OF(battery, capacity_ah), above(0, 1e5), "rated capacity, when new"},
+    {FIELD_OF(battery, internal_resistance_ohm), within(0, 100), "ohmic, from the terminals to the cells"},
+    {FIELD_OF(battery, reserve_fraction), below_end(0, 1), "share of the charge that planning does not use"},
+    {FIELD_OF(battery, open_circuit_voltage), above(0, 4e3),
+     "voltage at rest over the state of charge, from 0 to 1 ascending", Presence::optional, "voltage_v"},
+    {FIELD_OF(battery, resistance_curve), within(0, 100),
+     "ohmic resistance over the state of charge, ascending, constant beyond its ends; the branches' "
+     "resistances hold at charge 0.5 and follow its shape",
      Presence::optional, "resistance_ohm"},
-    {"/battery/branches", JOULECAST_MEMBER(battery.branches), {}, Presence::optional},
-    {"/battery/charge_lags", JOULECAST_MEMBER(battery.charge_lags), {}, Presence::optional},
-    {"/battery/cutoff_voltage_v", JOULECAST_MEMBER(battery.cutoff_voltage_v), above(0, 2e3),
+    {FIELD_OF(battery, branches), any, "resistor-capacitor branches of the equivalent circuit",
      Presence::optional},
-    {"/battery/coulombic_efficiency", JOULECAST_MEMBER(battery.coulombic_efficiency), above(0, 1),
+    {FIELD_OF(battery, charge_lags), any,
+     "diffusion: at a steady current the charge that determines the voltage leads the mean charge by the "
+     "charge that the current draws in lag_s",
      Presence::optional},
-    {"/battery/ageing_factor", JOULECAST_MEMBER(battery.ageing_factor), above(0, 1.2), Presence::optional},
-
-    {"/battery/activation_k", JOULECAST_MEMBER(battery.activation_k), within(0, 1e4), Presence::optional},
-    {"/battery/thermal_resistance_k_w", JOULECAST_MEMBER(battery.thermal_resistance_k_w), within(0, 1e3),
+    {FIELD_OF(battery, cutoff_voltage_v), above(0, 2e3), "voltage under load at which the battery is empty",
      Presence::optional},
-    {"/battery/thermal_time_constant_s", JOULECAST_MEMBER(battery.thermal_time_constant_s), above(0, 1e6),
+    {FIELD_OF(battery, coulombic_efficiency), above(0, 1), "charge returned over charge put in",
      Presence::optional},
-
-    {"/idle_power_w", JOULECAST_MEMBER(idle_power_w), within(0, 1e5)},
-
-    {"/limits/speed_m_s", JOULECAST_MEMBER(limits.speed_m_s), above(0, 50)},
-    {"/limits/acceleration_m_s2", JOULECAST_MEMBER(limits.acceleration_m_s2), above(0, 100)},
-    {"/limits/yaw_rate_rad_s", JOULECAST_MEMBER(limits.yaw_rate_rad_s), above(0, 100)},
-    {"/limits/current_a", JOULECAST_MEMBER(limits.current_a), above(0, 1e4)},
-    {"/limits/payload_kg", JOULECAST_MEMBER(limits.payload_kg), within(0, 1e5)},
-
-    {"/effects", JOULECAST_MEMBER(effects), {}, Presence::optional},
+    {FIELD_OF(battery, ageing_factor), above(0, 1.2), "present over rated capacity", Presence::optional},
+    {FIELD_OF(battery, activation_k), within(0, 1e4),
+     "every resistance and charge lag is multiplied by exp(this * (1/T - 1/298.15 K)); the curves hold at 25 "
+     "degrees Celsius",
+     Presence::optional},
+    {FIELD_OF(battery, thermal_resistance_k_w), within(0, 1e3),
+     "from the battery to its surroundings; its own losses heat it", Presence::optional},
+    {FIELD_OF(battery, thermal_time_constant_s), above(0, 1e6), "time constant of warming and cooling",
+     Presence::optional},
+    {FIELD(idle_power_w), within(0, 1e5), "power at rest with the drives off"},
+    {FIELD_OF(limits, speed_m_s), above(0, 50), "forward speed"},
+    {FIELD_OF(limits, acceleration_m_s2), above(0, 100), "forward acceleration and braking"},
+    {FIELD_OF(limits, yaw_rate_rad_s), above(0, 100), "rate of turning"},
+    {FIELD_OF(limits, current_a), above(0, 1e4), "armature current of each motor"},
+    {FIELD_OF(limits, payload_kg), within(0, 1e5), "mass of the payload"},
+    {FIELD(effects), any,
+     "adopted effects: catalogue id to its parameters; ids, names and bounds are those of the effect "
+     "catalogue",
+     Presence::optional},
 };
 
-#undef JOULECAST_MEMBER
+#undef FIELD_OF
+#undef FIELD
+#undef AT
 
 const ElementField<BatteryBranch> branch_table[] = {
-    {"resistance_ohm", &BatteryBranch::resistance_ohm, within(0, 100)},
-    {"time_constant_s", &BatteryBranch::time_constant_s, above(0, 1e6)},
+    {"resistance_ohm", &BatteryBranch::resistance_ohm, within(0, 100), "of the branch"},
+    {"time_constant_s", &BatteryBranch::time_constant_s, above(0, 1e6), "of the branch"},
 };
 
 const ElementField<ChargeLag> lag_table[] = {
-    {"lag_s", &ChargeLag::lag_s, within(0, 1e5)},
-    {"time_constant_s", &ChargeLag::time_constant_s, above(0, 1e6)},
+    {"lag_s", &ChargeLag::lag_s, within(0, 1e5), "lead of the charge at the surface"},
+    {"time_constant_s", &ChargeLag::time_constant_s, above(0, 1e6), "time constant of the lead"},
+};
+
+constexpr ObjectWords objects[] = {
+    {"/kinematics", "wheels and centre of mass"},
+    {"/mass", "masses and inertias"},
+    {"/motor", "motors, gears and friction; both sides alike where a value is one number"},
+    {"/battery",
+     "the first four members are sufficient; the others refine the model and are determined by `joulecast "
+     "calibrate battery`"},
+    {"/limits", "limits of the robot's motion and payload"},
 };
 
 struct Unit {
@@ -137,12 +157,18 @@ std::span<const Field> fields() {
   return table;
 }
 
-std::span<const ElementField<BatteryBranch>> branch_fields() {
+template <>
+std::span<const ElementField<BatteryBranch>> element_fields() {
   return branch_table;
 }
 
-std::span<const ElementField<ChargeLag>> lag_fields() {
+template <>
+std::span<const ElementField<ChargeLag>> element_fields() {
   return lag_table;
+}
+
+std::span<const ObjectWords> object_words() {
+  return objects;
 }
 
 bool is_robot_id(std::string_view text) {

@@ -22,8 +22,8 @@ using Member = std::variant<std::string& (*)(RobotModel&),            // string
                             std::optional<double>& (*)(RobotModel&),  // number that may be absent
                             std::array<double, 2>& (*)(RobotModel&),  // [right, left]
                             Curve& (*)(RobotModel&),                  // {"charge": [...], value_key: [...]}
-                            std::vector<BatteryBranch>& (*)(RobotModel&),  // [{branch_fields()}, ...]
-                            std::vector<ChargeLag>& (*)(RobotModel&),      // [{lag_fields()}, ...]
+                            std::vector<BatteryBranch>& (*)(RobotModel&),  // [{element_fields()}, ...]
+                            std::vector<ChargeLag>& (*)(RobotModel&),      // the same
                             std::vector<AdoptedEffect>& (*)(RobotModel&)   // {id: {parameter: number}}
                             >;
 
@@ -33,7 +33,8 @@ enum class Presence { required, optional };
 struct Field {
   std::string_view pointer;  // JSON pointer in the robot file; its last part carries the unit
   Member member;
-  Bounds bounds{};  // of the number, or of every value of an array or curve
+  Bounds bounds;  // of the number, or of every value of an array or curve
+  std::string_view words;
   Presence presence = Presence::required;
   std::string_view value_key{};  // of a curve
 
@@ -46,7 +47,20 @@ struct ElementField {
   std::string_view key;
   double Element::*member;
   Bounds bounds;
+  std::string_view words;
 };
+
+// The description of an object of the file.
+struct ObjectWords {
+  std::string_view pointer, words;
+};
+inline constexpr std::string_view file_words =
+    "Parameters of a differential-drive robot. Names end with their units. Inertia and friction are at the "
+    "wheel; sides are [right, left]; the payload is over the axle. In addition to this schema a reader "
+    "checks: "
+    "yaw inertia against the parallel-axis bound, ascending curves, cut-off below nominal voltage, idle "
+    "power "
+    "within the capability of the battery.";
 
 inline constexpr std::size_t max_curve_points = 1001;
 inline constexpr std::size_t max_branches = 2;  // and charge lags
@@ -56,12 +70,18 @@ inline constexpr std::size_t max_effect_parameters = 64;
 inline constexpr std::string_view robot_id_pattern = "^[A-Za-z0-9._-]{1,47}$";
 inline constexpr std::string_view effect_name_pattern = "^[a-z0-9_]{1,64}$";
 
-// Every key of the robot file, once: parsing, validation, writing and the schema's test walk this table.
+// Every key of the robot file, once: parsing, validation, writing and the schema follow from this table.
 std::span<const Field> fields();
 
 // The keys of one element of /battery/branches and of /battery/charge_lags.
-std::span<const ElementField<BatteryBranch>> branch_fields();
-std::span<const ElementField<ChargeLag>> lag_fields();
+template <class Element>
+std::span<const ElementField<Element>> element_fields();
+template <>
+std::span<const ElementField<BatteryBranch>> element_fields();
+template <>
+std::span<const ElementField<ChargeLag>> element_fields();
+
+std::span<const ObjectWords> object_words();
 
 bool is_robot_id(std::string_view text);     // robot_id_pattern
 bool is_effect_name(std::string_view text);  // effect_name_pattern, for effect ids and their parameters

@@ -144,20 +144,18 @@ void read_curve(const Json& value, const std::string& pointer, std::string_view 
 }
 
 template <class Element>
-void read_elements(const Json& value, const std::string& pointer,
-                   std::span<const ElementField<Element>> element_fields, std::vector<Element>& out,
-                   Problems& problems) {
+void read(const Json& value, const std::string& pointer, std::vector<Element>& out, Problems& problems) {
   if (!value.is_array()) {
     problems.add(pointer, fmt::format("is {}, must be an array of objects", value.type_name()));
     return;
   }
   std::set<std::string_view> known;
-  for (const auto& field : element_fields) known.insert(field.key);
+  for (const auto& field : element_fields<Element>()) known.insert(field.key);
   for (std::size_t i = 0; i < value.size(); ++i) {
     const std::string element_pointer = fmt::format("{}/{}", pointer, i);
     Element& element = out.emplace_back();
     if (!object_of(value[i], element_pointer, known, problems)) continue;
-    for (const auto& field : element_fields) {
+    for (const auto& field : element_fields<Element>()) {
       const std::string member = fmt::format("{}/{}", element_pointer, field.key);
       const auto found = value[i].find(field.key);
       if (found == value[i].end()) {
@@ -167,15 +165,6 @@ void read_elements(const Json& value, const std::string& pointer,
       }
     }
   }
-}
-
-void read(const Json& value, const std::string& pointer, std::vector<BatteryBranch>& out,
-          Problems& problems) {
-  read_elements(value, pointer, branch_fields(), out, problems);
-}
-
-void read(const Json& value, const std::string& pointer, std::vector<ChargeLag>& out, Problems& problems) {
-  read_elements(value, pointer, lag_fields(), out, problems);
 }
 
 void read(const Json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
@@ -225,23 +214,20 @@ void check_curve(const Curve& curve, const Field& field, const std::string& poin
 }
 
 template <class Element>
-void check_elements(const std::vector<Element>& elements,
-                    std::span<const ElementField<Element>> element_fields, const std::string& pointer,
-                    Problems& problems) {
+void check(const std::vector<Element>& elements, const std::string& pointer, Problems& problems) {
   if (elements.size() > max_branches) {
     problems.add(pointer,
                  fmt::format("has {} elements, must have at most {}", elements.size(), max_branches));
   }
   for (std::size_t i = 0; i < elements.size(); ++i) {
-    for (const auto& field : element_fields) {
+    for (const auto& field : element_fields<Element>()) {
       check_bounds(elements[i].*field.member, field.bounds, fmt::format("{}/{}/{}", pointer, i, field.key),
                    field.key, problems);
     }
   }
 }
 
-void check_effects(const std::vector<AdoptedEffect>& effects, const std::string& pointer,
-                   Problems& problems) {
+void check(const std::vector<AdoptedEffect>& effects, const std::string& pointer, Problems& problems) {
   if (effects.size() > max_effects)
     problems.add(pointer, fmt::format("has {} effects, must have at most {}", effects.size(), max_effects));
   std::set<std::string_view> ids;
@@ -287,14 +273,8 @@ void check_field(const Field& field, RobotModel& model, Problems& problems) {
                                   field.key(), problems);
                  },
                  [&](Curve& (*member)(RobotModel&)) { check_curve(member(model), field, pointer, problems); },
-                 [&](std::vector<BatteryBranch>& (*member)(RobotModel&)) {
-                   check_elements(member(model), branch_fields(), pointer, problems);
-                 },
-                 [&](std::vector<ChargeLag>& (*member)(RobotModel&)) {
-                   check_elements(member(model), lag_fields(), pointer, problems);
-                 },
-                 [&](std::vector<AdoptedEffect>& (*member)(RobotModel&)) {
-                   check_effects(member(model), pointer, problems);
+                 [&]<class Element>(std::vector<Element>& (*member)(RobotModel&)) {
+                   check(member(model), pointer, problems);
                  },
              },
              field.member);
@@ -471,11 +451,12 @@ Json written(const Curve& curve, std::string_view value_key) {
 }
 
 template <class Element>
-Json written(const std::vector<Element>& elements, std::span<const ElementField<Element>> element_fields) {
+Json written(const std::vector<Element>& elements) {
   Json out = Json::array();
   for (const Element& element : elements) {
     Json& object = out.emplace_back(Json::object());
-    for (const auto& field : element_fields) object[std::string(field.key)] = element.*field.member;
+    for (const auto& field : element_fields<Element>())
+      object[std::string(field.key)] = element.*field.member;
   }
   return out;
 }
@@ -498,15 +479,7 @@ void write_field(const Field& field, RobotModel& model, Json& document) {
                           if (!member(model).empty())
                             document[pointer] = written(member(model), field.value_key);
                         },
-                        [&](std::vector<BatteryBranch>& (*member)(RobotModel&)) {
-                          if (!member(model).empty())
-                            document[pointer] = written(member(model), branch_fields());
-                        },
-                        [&](std::vector<ChargeLag>& (*member)(RobotModel&)) {
-                          if (!member(model).empty())
-                            document[pointer] = written(member(model), lag_fields());
-                        },
-                        [&](std::vector<AdoptedEffect>& (*member)(RobotModel&)) {
+                        [&]<class Element>(std::vector<Element>& (*member)(RobotModel&)) {
                           if (!member(model).empty()) document[pointer] = written(member(model));
                         },
                         [&](auto member) { document[pointer] = member(model); }},

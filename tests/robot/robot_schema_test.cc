@@ -1,5 +1,10 @@
+#include "robot/robot_schema.h"
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -7,8 +12,8 @@
 #include <set>
 #include <string>
 
+#include "describe/schema_faults.h"
 #include "robot/robot_fields.h"
-#include "robot/robot_file.h"
 
 namespace joulecast::robot {
 namespace {
@@ -16,14 +21,7 @@ namespace {
 using nlohmann::json;
 
 json schema() {
-  std::ifstream file(std::string(JOULECAST_SOURCE_DIR) + "/schemas/robot.schema.json");
-  return json::parse(file);
-}
-
-// The node, with its reference resolved.
-const json& resolved(const json& root, const json& node) {
-  if (!node.contains("$ref")) return node;
-  return root[json::json_pointer(node["$ref"].get<std::string>().substr(1))];
+  return robot_schema();
 }
 
 // The constraints on numbers at one location.
@@ -57,18 +55,16 @@ Bounds bounds_of(const json& node) {
 }
 
 // Visits the schema down to its leaves. Every object with named properties must be closed.
-void collect(const json& root, const json& reference, const std::string& pointer, bool required,
-             Statements& out) {
-  const json& node = resolved(root, reference);
+void collect(const json& node, const std::string& pointer, bool required, Statements& out) {
   if (node.contains("properties")) {
     EXPECT_EQ(node.value("additionalProperties", json(true)), json(false)) << pointer;
     for (const auto& [key, child] : node["properties"].items()) {
       bool child_required = false;
       for (const auto& name : node.value("required", json::array())) child_required |= name == key;
-      collect(root, child, pointer + "/" + key, child_required, out);
+      collect(child, pointer + "/" + key, child_required, out);
     }
   } else if (node.contains("items")) {
-    collect(root, node["items"], pointer, required, out);
+    collect(node["items"], pointer, required, out);
   } else {
     out[pointer] = {bounds_of(node), required};
   }
@@ -83,10 +79,11 @@ Statements from_table() {
       out[pointer + "/charge"] = {fraction, true};
       out[pointer + "/" + std::string(field.value_key)] = {field.bounds, true};
     } else if (std::holds_alternative<std::vector<BatteryBranch>& (*)(RobotModel&)>(field.member)) {
-      for (const auto& branch : branch_fields())
+      for (const auto& branch : element_fields<BatteryBranch>())
         out[pointer + "/" + std::string(branch.key)] = {branch.bounds, true};
     } else if (std::holds_alternative<std::vector<ChargeLag>& (*)(RobotModel&)>(field.member)) {
-      for (const auto& lag : lag_fields()) out[pointer + "/" + std::string(lag.key)] = {lag.bounds, true};
+      for (const auto& lag : element_fields<ChargeLag>())
+        out[pointer + "/" + std::string(lag.key)] = {lag.bounds, true};
     } else {
       out[pointer] = {field.bounds, required};
     }
@@ -94,10 +91,29 @@ Statements from_table() {
   return out;
 }
 
+TEST(RobotSchema, MatchesTheCommittedFile) {
+  const char* path = JOULECAST_SOURCE_DIR "/schemas/robot.schema.json";
+  const std::string text = robot_schema().dump(2) + "\n";
+  if (std::getenv("UPDATE") != nullptr) std::ofstream(path) << text;
+  std::ifstream file(path);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), text) << "regenerate: UPDATE=1";
+}
+
+TEST(RobotSchema, AcceptsShippedRobots) {
+  for (const auto& entry : std::filesystem::directory_iterator(JOULECAST_SOURCE_DIR "/deploy/robots")) {
+    if (entry.path().extension() != ".json") continue;
+    std::ifstream file(entry.path());
+    json robot = json::parse(file);
+    EXPECT_TRUE(described::schema_faults(robot_schema(), robot).empty()) << entry.path();
+    robot["battery"]["branches"] = {{{"resistance_ohm", -1}}};
+    EXPECT_EQ(described::schema_faults(robot_schema(), robot).size(), 2U) << entry.path();
+  }
+}
+
 TEST(RobotSchema, MatchesTheTable) {
   const json document = schema();
   Statements from_schema;
-  collect(document, document, "", true, from_schema);
+  collect(document, "", true, from_schema);
   EXPECT_EQ(from_schema, from_table());
 }
 
@@ -119,12 +135,12 @@ TEST(RobotSchema, SharesPatternsCountsAndDefaults) {
   EXPECT_EQ(effects["additionalProperties"]["propertyNames"]["pattern"], effect_name_pattern);
   EXPECT_EQ(effects["maxProperties"], max_effects);
   EXPECT_EQ(effects["additionalProperties"]["maxProperties"], max_effect_parameters);
-  const json& battery = document["$defs"]["battery"]["properties"];
+  const json& battery = properties["battery"]["properties"];
   EXPECT_EQ(battery["branches"]["maxItems"], max_branches);
   EXPECT_EQ(battery["charge_lags"]["maxItems"], max_branches);
   EXPECT_EQ(battery["open_circuit_voltage"]["properties"]["voltage_v"]["maxItems"], max_curve_points);
   EXPECT_EQ(battery["resistance_curve"]["properties"]["resistance_ohm"]["maxItems"], max_curve_points);
-  EXPECT_EQ(document["$defs"]["charge"]["maxItems"], max_curve_points);
+  EXPECT_EQ(battery["resistance_curve"]["properties"]["charge"]["maxItems"], max_curve_points);
 
   RobotModel born;
   for (const Field& field : fields()) {
@@ -133,7 +149,8 @@ TEST(RobotSchema, SharesPatternsCountsAndDefaults) {
     const std::string pointer(field.pointer);
     const std::size_t slash = pointer.find('/', 1);
     const json& node = properties[pointer.substr(1, slash - 1)]["properties"][pointer.substr(slash + 1)];
-    EXPECT_EQ(node.value("default", json()), json((*member)(born))) << pointer;
+    EXPECT_TRUE(node.value("description", "").ends_with(fmt::format("; default {}", (*member)(born))))
+        << pointer;
   }
 }
 

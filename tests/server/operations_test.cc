@@ -126,13 +126,13 @@ TEST_F(OperationsTest, DescribesEveryRoute) {
 }
 
 TEST(OpenApi, IncludesReferencedSchemas) {
-  const std::vector<EmbeddedFile> files{
-      {"problem.schema.json", R"({"$id": "p", "type": "object"})"},
-      {"a.schema.json",
-       R"({"$id": "x/a.schema.json", "properties": {"l": {"$ref": "#/$defs/l"}, "b": {"$ref": "b.schema.json#/$defs/c"}}, "$defs": {"l": {}}})"},
-      {"b.schema.json", R"({"$defs": {"c": {"$ref": "https://x/y/a.schema.json"}}})"},
-      {"openapi.schema.json", "{}"},
-      {"unused.schema.json", "{}"}};
+  const auto reference = [](const char* to) { return described::Schema{{"$ref", to}}; };
+  const described::Schemas schemas_given{
+      {"problem", {{"type", "object"}}},
+      {"a", {{"properties", {{"l", reference("#/properties/b")}, {"b", reference("b.schema.json")}}}}},
+      {"b", {{"items", {{"oneOf", described::Schema::array({reference("a.schema.json")})}}}}},
+      {"openapi", described::Schema::object()},
+      {"unused", described::Schema::object()}};
   Endpoint endpoint;
   endpoint.method = Method::post;
   endpoint.path = "/v1/{id}/x";
@@ -143,15 +143,14 @@ TEST(OpenApi, IncludesReferencedSchemas) {
   endpoint.response_schema = "b";
   endpoint.error_statuses = {404};
   endpoint.parameters = {{.name = "n", .type = Parameter::Type::integer, .minimum = 1}};
-  const auto text = openapi_document(std::vector<Endpoint>{endpoint}, files, {});
+  const auto text = openapi_document(std::vector<Endpoint>{endpoint}, schemas_given, {});
   ASSERT_TRUE(text.has_value()) << describe(text.error());
   const json document = json::parse(*text);
   const json& schemas = document.at("components").at("schemas");
-  EXPECT_EQ(schemas.at("a").at("properties").at("l").at("$ref"), "#/components/schemas/a.l");
-  EXPECT_EQ(schemas.at("a").at("properties").at("b").at("$ref"), "#/components/schemas/b.c");
-  EXPECT_EQ(schemas.at("b.c").at("$ref"), "#/components/schemas/a");
+  EXPECT_EQ(schemas.at("a").at("properties").at("l").at("$ref"), "#/components/schemas/a/properties/b");
+  EXPECT_EQ(schemas.at("a").at("properties").at("b").at("$ref"), "#/components/schemas/b");
+  EXPECT_EQ(schemas.at("b").at("items").at("oneOf").at(0).at("$ref"), "#/components/schemas/a");
   EXPECT_FALSE(schemas.contains("unused"));
-  EXPECT_FALSE(schemas.at("a").contains("$id"));
   const json& operation = document.at("paths").at("/v1/{id}/x").at("post");
   EXPECT_EQ(operation.at("parameters").at(0).at("in"), "path");
   EXPECT_EQ(operation.at("parameters").at(1).at("schema").at("minimum"), 1);
@@ -159,7 +158,7 @@ TEST(OpenApi, IncludesReferencedSchemas) {
     EXPECT_TRUE(operation.at("responses").contains(status)) << status;
   }
   endpoint.response_schema = "missing";
-  EXPECT_FALSE(openapi_document(std::vector<Endpoint>{endpoint}, files, {}).has_value());
+  EXPECT_FALSE(openapi_document(std::vector<Endpoint>{endpoint}, schemas_given, {}).has_value());
 }
 
 std::string gunzip(std::string_view packed) {

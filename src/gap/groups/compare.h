@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -13,6 +14,7 @@ namespace joulecast::gap {
 
 // The strength of one cause in one group, above that in the group where it is weakest: only differences show.
 struct GroupStrength {
+  std::string group;
   double value = 0, deviation = 0;
   double energy_per_m_j = 0;  // by which this raises the energy of a metre; NaN: no power was measured
 };
@@ -20,7 +22,7 @@ struct GroupStrength {
 // A cause with a strength that differs between groups.
 struct ComparedEffect {
   std::string id, parameter, unit;
-  std::vector<GroupStrength> groups;  // in the order of Comparison::groups
+  std::vector<GroupStrength> groups;
 };
 
 struct ComparedGroup {
@@ -33,10 +35,10 @@ struct ComparedGroup {
 
 // Decomposition of the difference in energy per metre between the groups that spend least and most.
 struct GroupDifference {
-  std::size_t from = 0, to = 0;     // groups
-  double energy_per_m_j = 0;        // measured, `to` above `from`
-  double by_motion_j = 0;           // by the model, from their motion and payload
-  std::vector<double> by_effect_j;  // of each compared effect
+  std::string from, to;       // names of groups
+  double energy_per_m_j = 0;  // measured, `to` above `from`
+  double by_motion_j = 0;     // by the model, from their motion and payload
+  std::vector<std::pair<std::string, double>> by_effect_j;
   double unexplained_j = 0;
 };
 

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/try.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/groups/comparer.h"
 
@@ -81,22 +82,21 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   checks = check_and_correct(trusted, robot);
   // Steps from one mission to the next are the subject of the comparison.
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
-  auto data = posterior::make_data(trusted.missions, robot);
-  if (!data) return tl::unexpected(data.error());
-  data->group = std::move(groups);
+  TRY_ASSIGN(auto data, posterior::make_data(trusted.missions, robot));
+  data.group = std::move(groups);
   std::vector<std::size_t> count(c.groups.size(), 0);
-  for (const Window& w : data->windows) ++count[data->group[w.mission]];
+  for (const Window& w : data.windows) ++count[data.group[w.mission]];
   for (std::size_t k = 0; k < count.size(); ++k) {
     if (count[k] < min_group_windows)
       return invalid("log", "holds too little motion in group " + c.groups[k].name);
   }
-  if (!data->power && data->from_motion.alone())
+  if (!data.power && data.from_motion.alone())
     return invalid("log", "measures neither power nor voltage nor current of the motors");
-  describe(trusted, *data, c);
+  describe(trusted, data, c);
   // Rows are equally long.
-  const Eigen::VectorXd speed = data->rows.mean(
+  const Eigen::VectorXd speed = data.rows.mean(
       [&](const Window& w) { return windows::plain_terms(w, robot.kinematics.wheel_radius_m)[1]; });
-  GroupedData grouped{std::move(*data), {}, {speed.begin(), speed.end()}, {}};
+  GroupedData grouped{std::move(data), {}, {speed.begin(), speed.end()}, {}};
   grouped.joule.assign(grouped.way_m.size(), 1);
   grouped.offset_j.assign(grouped.way_m.size(), 0);
   compare_groups(std::move(grouped), progress, c);

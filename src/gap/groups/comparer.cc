@@ -182,7 +182,7 @@ class Comparer {
     };
     const auto above = [&](std::size_t g, std::size_t o) {
       const Eigen::MatrixXd rows = apart(g, o);
-      return GroupStrength{(rows * strengths).norm(),
+      return GroupStrength{c_.groups[g].name, (rows * strengths).norm(),
                            std::sqrt((rows * covariance * rows.transpose()).trace()), energy[g] - energy[o]};
     };
     std::size_t low = 0, high = 0;
@@ -202,14 +202,15 @@ class Comparer {
     if (!std::ranges::all_of(c_.groups, known)) return;
     GroupDifference& d = c_.difference.emplace();
     const auto [least, most] = std::ranges::minmax_element(c_.groups, {}, &ComparedGroup::energy_per_m_j);
-    d.from = static_cast<std::size_t>(least - c_.groups.begin());
-    d.to = static_cast<std::size_t>(most - c_.groups.begin());
+    d.from = least->name;
+    d.to = most->name;
     d.energy_per_m_j = most->energy_per_m_j - least->energy_per_m_j;
     d.by_motion_j = most->model_per_m_j - least->model_per_m_j;
     d.unexplained_j = d.energy_per_m_j - d.by_motion_j;
     for (const ComparedEffect& e : c_.effects) {
-      d.by_effect_j.push_back(e.groups[d.to].energy_per_m_j - e.groups[d.from].energy_per_m_j);
-      d.unexplained_j -= d.by_effect_j.back();
+      const auto of = [&](const auto& group) { return e.groups[group - c_.groups.begin()].energy_per_m_j; };
+      d.by_effect_j.emplace_back(e.id, of(most) - of(least));
+      d.unexplained_j -= d.by_effect_j.back().second;
     }
   }
 

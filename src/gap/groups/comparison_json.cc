@@ -2,57 +2,79 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/json_number.h"
 #include "gap/verdict/diagnosis_json.h"
 
 namespace joulecast::gap {
 namespace {
 
-using nlohmann::ordered_json;
+using described::Table;
 
-ordered_json difference_to_json(const Comparison& c) {
-  if (!c.difference) return nullptr;
-  const GroupDifference& d = *c.difference;
-  ordered_json by_effect = ordered_json::object();
-  for (std::size_t k = 0; k < c.effects.size(); ++k)
-    by_effect[c.effects[k].id] = json_number(d.by_effect_j[k]);
-  return {{"from", c.groups[d.from].name},
-          {"to", c.groups[d.to].name},
-          {"energy_per_m_j", json_number(d.energy_per_m_j)},
-          {"by_motion_j", json_number(d.by_motion_j)},
-          {"by_effect_j", std::move(by_effect)},
-          {"unexplained_j", json_number(d.unexplained_j)}};
+const Table<ComparedGroup>& compared_group_table() {
+  using G = ComparedGroup;
+  static const auto table =
+      Table<G>()
+          .value("name", &G::name, "of the group")
+          .value("missions", &G::missions, "number of missions")
+          .value("samples", &G::samples, "number of samples")
+          .number_or_null("way_m", &G::way_m, "distance driven")
+          .number_or_null("energy_per_m_j", &G::energy_per_m_j, "measured energy of a metre")
+          .number_or_null("model_per_m_j", &G::model_per_m_j,
+                          "the same by the model with the common effects");
+  return table;
+}
+
+const Table<ComparedEffect>& compared_effect_table() {
+  using S = GroupStrength;
+  static const auto strength =
+      Table<S>()
+          .number_or_null("value", &S::value, "strength above that of the group where it is weakest")
+          .number_or_null("sd", &S::deviation, "standard deviation of value")
+          .number_or_null("energy_per_m_j", &S::energy_per_m_j, "energy of a metre by it");
+  using E = ComparedEffect;
+  static const auto table = Table<E>()
+                                .value("id", &E::id, "effect of the catalogue, or covariate:<name>")
+                                .value("parameter", &E::parameter, "name of the strength")
+                                .value("unit", &E::unit, "SI; \"1\" for ratios")
+                                .map("groups", &E::groups, "by their names", &S::group, strength);
+  return table;
+}
+
+const Table<GroupDifference>& difference_table() {
+  using D = GroupDifference;
+  static const auto table =
+      Table<D>()
+          .value("from", &D::from, "group with the least energy of a metre")
+          .value("to", &D::to, "group with the most")
+          .number_or_null("energy_per_m_j", &D::energy_per_m_j,
+                          "difference of the measured energy of a metre")
+          .number_or_null("by_motion_j", &D::by_motion_j, "part of it by motion and payload")
+          .map("by_effect_j", &D::by_effect_j, "parts by the effects", true)
+          .number_or_null("unexplained_j", &D::unexplained_j, "the remainder");
+  return table;
+}
+
+const Table<Comparison>& comparison_table() {
+  using C = Comparison;
+  static const auto table =
+      Table<C>("Comparison of groups of missions, as printed by `joulecast gap --compare-by --json`")
+          .include(diagnosis_table(), &C::diagnosis)
+          .value(
+              "kind", [](const C&) { return "comparison"; }, "distinguishes it from other diagnoses")
+          .list("groups", &C::groups, "the groups, one by one", compared_group_table())
+          .texts("common", &C::common, "effects that all groups have")
+          .list("strengths", &C::effects, "effects whose strengths differ between groups",
+                compared_effect_table())
+          .object("difference", &C::difference,
+                  "between the groups that take least and most; null: no power was measured",
+                  difference_table())
+          .texts("limits", &C::limits, "limits of the comparison, in sentences");
+  return table;
 }
 
 }  // namespace
 
-ordered_json comparison_to_json(const Comparison& c) {
-  ordered_json out = diagnosis_to_json(c.diagnosis);
-  out["kind"] = "comparison";
-  out["groups"] = ordered_json::array();
-  for (const ComparedGroup& g : c.groups) {
-    out["groups"].push_back({{"name", g.name},
-                             {"missions", g.missions},
-                             {"samples", g.samples},
-                             {"way_m", json_number(g.way_m)},
-                             {"energy_per_m_j", json_number(g.energy_per_m_j)},
-                             {"model_per_m_j", json_number(g.model_per_m_j)}});
-  }
-  out["common"] = c.common;
-  out["strengths"] = ordered_json::array();
-  for (const ComparedEffect& e : c.effects) {
-    ordered_json groups = ordered_json::object();
-    for (std::size_t g = 0; g < e.groups.size(); ++g) {
-      groups[c.groups[g].name] = {{"value", json_number(e.groups[g].value)},
-                                  {"sd", json_number(e.groups[g].deviation)},
-                                  {"energy_per_m_j", json_number(e.groups[g].energy_per_m_j)}};
-    }
-    out["strengths"].push_back(
-        {{"id", e.id}, {"parameter", e.parameter}, {"unit", e.unit}, {"groups", std::move(groups)}});
-  }
-  out["difference"] = difference_to_json(c);
-  out["limits"] = c.limits;
-  return out;
+nlohmann::ordered_json comparison_to_json(const Comparison& comparison) {
+  return comparison_table().document(comparison);
 }
 
 }  // namespace joulecast::gap

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/bounds.h"
+#include "base/try.h"
 #include "signals/covariates.h"
 #include "telemetry/csv_table.h"
 
@@ -126,9 +127,9 @@ class RunTableRow {
     run.motor_j = {number_[right_energy], number_[left_energy]};
     run.model_energy_j = number_[model_energy];
     run.model_motor_j = {number_[model_right], number_[model_left]};
-    if (auto turn = read_turn(run.at); !turn) return tl::unexpected(turn.error());
+    TRY(read_turn(run.at));
     if (std::fabs(run.at.climb_m) > run.at.distance_m) return wrong(climb, "is more than distance_m");
-    if (auto energies = check_energies(run); !energies) return tl::unexpected(energies.error());
+    TRY(check_energies(run));
     run.covariates.resize(set.covariates.size(), MissionRun::absent);
     for (const auto& [place, index] : header_.covariates) {
       const auto value = number_in(trimmed(fields_[place]));
@@ -213,10 +214,9 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
     };
     const bool covariate = name.starts_with(covariate_prefix);
     if (covariate || name.starts_with(label_prefix)) {
-      const auto index =
-          own(covariate ? covariate_prefix : label_prefix, covariate ? set.covariates : set.labels);
-      if (!index) return tl::unexpected(index.error());
-      (covariate ? header.covariates : header.labels).emplace_back(c, *index);
+      TRY_ASSIGN(const auto index,
+                 own(covariate ? covariate_prefix : label_prefix, covariate ? set.covariates : set.labels));
+      (covariate ? header.covariates : header.labels).emplace_back(c, index);
       continue;
     }
     const auto found =
@@ -237,18 +237,16 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
 Result<void> read_file(const RunFile& file, const robot::RobotModel& robot, bool several, RunSet& set) {
   auto table = telemetry::CsvTable::open(file.text, ',');
   if (!table) return invalid(file.name, describe(table.error()));
-  const auto header = read_header(table->header(), file.name + ": line 1", set);
-  if (!header) return tl::unexpected(header.error());
+  TRY_ASSIGN(const auto header, read_header(table->header(), file.name + ": line 1", set));
   std::vector<std::string_view> fields;
   for (;;) {
     const auto more = table->next(fields);
     if (!more) return invalid(file.name, describe(more.error()));
     if (!*more) return {};
-    auto run = RunTableRow(fields, *header, file.name + ": line " + std::to_string(table->line()))
-                   .run(table->line(), robot, set);
-    if (!run) return tl::unexpected(std::move(run.error()));
-    if (several && run->table.empty()) run->table = file.name;
-    set.runs.push_back(std::move(*run));
+    TRY_ASSIGN(auto run, RunTableRow(fields, header, file.name + ": line " + std::to_string(table->line()))
+                             .run(table->line(), robot, set));
+    if (several && run.table.empty()) run.table = file.name;
+    set.runs.push_back(std::move(run));
     if (set.runs.size() > most_runs)
       return fail(Fault::too_large, file.name, "holds more than " + std::to_string(most_runs) + " runs");
   }
@@ -283,7 +281,7 @@ Result<std::vector<std::string>> RunSet::groups_by(std::string_view label) const
 Result<RunSet> read_runs(std::span<const RunFile> files, const robot::RobotModel& robot) {
   RunSet set;
   for (const RunFile& file : files) {
-    if (auto read = read_file(file, robot, files.size() > 1, set); !read) return tl::unexpected(read.error());
+    TRY(read_file(file, robot, files.size() > 1, set));
   }
   if (set.runs.size() < fewest_runs) {
     return invalid(files.front().name, "holds " + std::to_string(set.runs.size()) + " runs, at least " +

@@ -2,49 +2,74 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/json_number.h"
+#include "describe/input.h"
 #include "gap/verdict/diagnosis_json.h"
 
 namespace joulecast::gap {
 namespace {
 
-using nlohmann::ordered_json;
+using described::Table;
+using described::within;
 
-ordered_json conditions_to_json(const std::vector<LeftOut>& conditions) {
-  ordered_json all = ordered_json::array();
-  for (const LeftOut& l : conditions) {
-    all.push_back({{"left_out", l.what},
-                   {"runs", l.runs},
-                   {"held_out_before", json_number(l.before)},
-                   {"held_out_after", json_number(l.after)},
-                   {"baseline_held_out", json_number(l.referee)},
-                   {"fraction", json_number(1 - l.after / l.before)},
-                   {"ci", {json_number(l.interval[0]), json_number(l.interval[1])}},
-                   {"effects", l.effects}});
-  }
-  return all;
+const Table<LeftOut>& condition_table() {
+  using L = LeftOut;
+  static const auto table =
+      Table<L>()
+          .value("left_out", &L::what, "the condition, by name and value")
+          .value("runs", &L::runs, "number of runs under it")
+          .number_or_null("held_out_before", &L::before, "their mean |error| over measured energy")
+          .number_or_null("held_out_after", &L::after, "the same with the effects found without them")
+          .number_or_null("baseline_held_out", &L::referee, "the same of a linear regression without them")
+          .number_or_null(
+              "fraction", [](const L& l) { return 1 - l.after / l.before; }, "1 - after / before")
+          .numbers("ci", &L::interval, "of the fraction, 95 %")
+          .texts("effects", &L::effects, "the effects found without them");
+  return table;
+}
+
+const Table<JudgedRun>& run_table() {
+  using J = JudgedRun;
+  static const auto table =
+      Table<J>()
+          .value("run", within(&J::run, &MissionRun::name), "name of the run")
+          .value("table", within(&J::run, &MissionRun::table), "name of its table")
+          .number_or_null(
+              "measured_j", [](const J& run) { return run.run.measured_j(); }, "measured energy")
+          .number_or_null("model_j", &J::model_j, "energy by the model")
+          .number_or_null("with_effects_j", &J::after_j, "the same with the effects found")
+          .number_or_null("held_out_j", &J::held_out_j, "the same with the effects found without this run");
+  return table;
+}
+
+const Table<RunDiagnosis>& runs_table() {
+  using R = RunDiagnosis;
+  static const auto model =
+      Table<R>()
+          .value("given", &R::model_given, "the energies of the model are those of the table of runs")
+          .number_or_null("given_over_robot_file", &R::model_ratio, "their ratio to those of the robot file");
+  static const auto scatter =
+      Table<R>()
+          .number_or_null("run", &R::scatter, "standard deviation from run to run, relative to the energy")
+          .number_or_null("side_difference", &R::side_scatter, "the same of right minus left");
+  static const auto table =
+      Table<R>("Diagnosis of energies of runs, as printed by `joulecast gap --missions --json`")
+          .include(diagnosis_table(), &R::diagnosis)
+          .value(
+              "kind", [](const R&) { return "mission_energies"; }, "distinguishes it from other diagnoses")
+          .object("model", std::identity(), "the model that was diagnosed", model)
+          .object("scatter", std::identity(), "differences between runs that no effect explains", scatter)
+          .list("left_out_conditions", &R::conditions, "predictions of the runs of a condition by the others",
+                condition_table())
+          .texts("limits", &R::limits, "limits of these energies, in sentences")
+          .texts("not_visible", &R::not_visible, "effects without influence on these energies")
+          .list("runs", &R::runs, "the runs, one by one", run_table());
+  return table;
 }
 
 }  // namespace
 
-ordered_json runs_to_json(const RunDiagnosis& r) {
-  ordered_json out = diagnosis_to_json(r.diagnosis);
-  out["kind"] = "mission_energies";
-  out["model"] = {{"given", r.model_given}, {"given_over_robot_file", json_number(r.model_ratio)}};
-  out["scatter"] = {{"run", json_number(r.scatter)}, {"side_difference", json_number(r.side_scatter)}};
-  out["left_out_conditions"] = conditions_to_json(r.conditions);
-  out["limits"] = r.limits;
-  out["not_visible"] = r.not_visible;
-  out["runs"] = ordered_json::array();
-  for (const JudgedRun& run : r.runs) {
-    out["runs"].push_back({{"run", run.run.name},
-                           {"table", run.run.table},
-                           {"measured_j", json_number(run.run.measured_j())},
-                           {"model_j", json_number(run.model_j)},
-                           {"with_effects_j", json_number(run.after_j)},
-                           {"held_out_j", json_number(run.held_out_j)}});
-  }
-  return out;
+nlohmann::ordered_json runs_to_json(const RunDiagnosis& diagnosis) {
+  return runs_table().document(diagnosis);
 }
 
 }  // namespace joulecast::gap

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/try.h"
 #include "dynamics/catalogue.h"
 #include "gap/traits.h"
 #include "robot/robot_file.h"
@@ -69,26 +70,23 @@ double mean_of(const Json& value) {
 
 Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const robot::AdoptedEffect> found) {
   for (const robot::AdoptedEffect& effect : found) {
-    Result<dynamics::ActiveEffect> more = as_found(effect);
-    if (!more) return tl::unexpected(std::move(more.error()));
+    TRY_ASSIGN(dynamics::ActiveEffect more, as_found(effect));
     auto present = std::ranges::find(robot.effects, effect.id, &robot::AdoptedEffect::id);
     if (present == robot.effects.end()) {
-      robot.effects.push_back(dynamics::adopt(*more));
+      robot.effects.push_back(dynamics::adopt(more));
       present = robot.effects.end() - 1;
     } else {
-      const Result<dynamics::ActiveEffect> had = dynamics::activate(*present);
-      if (!had) return tl::unexpected(had.error());
-      const double a = std::fabs(had->values[0]), b = std::fabs(more->values[0]);
+      TRY_ASSIGN(const dynamics::ActiveEffect had, dynamics::activate(*present));
+      const double a = std::fabs(had.values[0]), b = std::fabs(more.values[0]);
       const double weight = a + b > 0 ? b / (a + b) : 0;
-      const auto& parameters = more->effect->info().parameters;
+      const auto& parameters = more.effect->info().parameters;
       for (std::size_t k = 0; k < parameters.size(); ++k) {
-        more->values[k] = k == 0 || parameters[k].strength
-                              ? had->values[k] + more->values[k]
-                              : std::lerp(had->values[k], more->values[k], weight);
+        more.values[k] = k == 0 || parameters[k].strength ? had.values[k] + more.values[k]
+                                                          : std::lerp(had.values[k], more.values[k], weight);
       }
-      *present = dynamics::adopt(*more);
+      *present = dynamics::adopt(more);
     }
-    if (const auto valid = dynamics::activate(*present); !valid) return tl::unexpected(valid.error());
+    TRY(dynamics::activate(*present));
   }
   return robot;
 }
@@ -98,9 +96,8 @@ Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
   Json file = robot::robot_to_json(robot);
   std::vector<robot::AdoptedEffect> others;
   for (const robot::AdoptedEffect& effect : found) {
-    const Result<dynamics::ActiveEffect> active = as_found(effect);
-    if (!active) return tl::unexpected(active.error());
-    if (const auto change = change_of(*active, file)) {
+    TRY_ASSIGN(const dynamics::ActiveEffect active, as_found(effect));
+    if (const auto change = change_of(active, file)) {
       change_number(file[Json::json_pointer(change->pointer)], *change);
     } else {
       others.push_back(effect);

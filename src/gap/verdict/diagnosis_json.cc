@@ -273,6 +273,8 @@ const Table<NextDrive>& next_drive_table() {
   return table;
 }
 
+}  // namespace
+
 const Table<Diagnosis>& diagnosis_table() {
   using D = Diagnosis;
   static const auto table =
@@ -341,8 +343,6 @@ const Table<Diagnosis>& diagnosis_table() {
           .elsewhere("back_test", described::of_type("object"), "printed by `joulecast gap --test`");
   return table;
 }
-
-}  // namespace
 
 described::Schemas diagnosis_schemas() {
   const Schema count = described::of_type("integer");

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/try.h"
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/words.h"
 
@@ -159,9 +160,8 @@ Result<robot::RobotModel> take(const Offer& offer, const robot::RobotModel& robo
   if (offer.effects.empty()) return fail(Fault::conflict, "", offer.refusal);
   if (!offer.refusal.empty() && !offer.choice_settles && !choice.force)
     return fail(Fault::conflict, "", offer.refusal);
-  const Result<std::vector<AdoptedEffect>> chosen = choose(offer, choice.effects);
-  if (!chosen) return tl::unexpected(chosen.error());
-  return offer.corrects_file ? with_corrections(robot, *chosen) : with_effects(robot, *chosen);
+  TRY_ASSIGN(const std::vector<AdoptedEffect> chosen, choose(offer, choice.effects));
+  return offer.corrects_file ? with_corrections(robot, chosen) : with_effects(robot, chosen);
 }
 
 }  // namespace joulecast::gap

@@ -46,7 +46,7 @@ const nodeColumns = (own) => [
   count('heard', 'Hears', (n) => n.robots_heard),
 ];
 
-// Seconds of a running mission that are not stored yet; null where none runs.
+// Seconds of an open mission that are not stored yet; null where none runs.
 function lagOf(lease, state) {
   if (!state?.mission || lease.stored_utime_us === null || state.utime_us === null) return null;
   return Math.max(0, (state.utime_us - lease.stored_utime_us) * 1e-6);
@@ -66,7 +66,7 @@ const leaseColumns = [
   figure('taken', 'Since', (l) => format.span(l.taken_s), { sort: (l) => l.taken_s }),
   figure('lag', 'Lag', (l) => <Lag second={l.lag} />, {
     sort: (l) => l.lag,
-    hint: 'from the newest sample of a running mission back to the last stored one',
+    hint: 'from the newest sample of an open mission back to the last stored one',
   }),
   count('takeovers', 'Takeovers', (l) => l.takeovers, { hint: 'from daemons that were gone' }),
   count('epoch', 'Epoch', (l) => l.epoch, { hint: 'grows with every change of the keeper' }),

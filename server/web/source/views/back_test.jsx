@@ -44,7 +44,7 @@ function TestTable({ missions }) {
 
 const reasons = {
   fitted_on: 'used for the fit',
-  open: 'still running',
+  open: 'still open',
   no_telemetry: 'without telemetry',
   contradicted: 'with contradictory telemetry',
   annulled: 'annulled',

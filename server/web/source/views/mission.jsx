@@ -83,7 +83,7 @@ function Figures({ mission: m, model }) {
 function Comparison({ mission: m, trace }) {
   if (m.model_version === null)
     return <Empty title="No model">The robot had no model on this mission.</Empty>;
-  if (m.state === 'open') return <Empty title="Still driving">Compared when the mission ends.</Empty>;
+  if (m.state === 'open') return <Empty title="Still open">Compared when the mission ends.</Empty>;
   if (m.contradictions.length > 0)
     return <Empty title="Not compared">The telemetry of this mission is contradicted.</Empty>;
   if (m.gap_s > 0)

@@ -37,7 +37,7 @@ function whyNowhere(state) {
   return state.live ? 'This robot does not report its position.' : 'None since the service started.';
 }
 
-// The map of the robot's path: the running mission's trace where the mission began before the oldest live
+// The map of the robot's path: the open mission's trace where the mission began before the oldest live
 // position, then the live positions. The trace of a mission that has just begun may not be stored yet.
 function LiveMap({ entry }) {
   const mission = entry.state.mission?.id;
