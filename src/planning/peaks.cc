@@ -6,8 +6,8 @@
 namespace joulecast::planning {
 namespace {
 
-// Tolerances for rows rounded to 1e-6, and for the motors' limits: constant acceleration between rows may
-// exceed them by 5e-5, and by the share of dry friction that is missing just above creeping.
+// Tolerances for rows rounded to 1e-6, and for the motors' limits: motions may exceed them between rows, and
+// by the share of dry friction that is missing just above creeping.
 constexpr double rounding = 1e-6, of_slopes = 1.5e-3;
 
 }  // namespace

@@ -19,6 +19,9 @@ struct BrokenLimit {
 // Faster, less than 6e-4 of the dry friction is missing.
 inline constexpr double creep_rad_s = 30 * dynamics::friction_width_rad_s;
 
+// Share by which the motors' limits may be exceeded between rows, where the acceleration is constant.
+inline constexpr double over_between_rows = 5e-5;
+
 // Whether both wheels turn so slowly that their dry friction, which the drive model smooths through
 // standstill, is missing: the computed motor loads are then too low.
 bool creeps(const std::array<double, 2>& wheel_speed_rad_s);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "planning/gauss.h"
+#include "planning/peaks.h"
 #include "planning/root.h"
 
 namespace joulecast::planning {
@@ -47,6 +48,18 @@ std::vector<double> lost_at_corners_s(const SpeedGrid& grid, const std::vector<d
 
 std::string number(double x) {
   return std::to_string(x);
+}
+
+// In how many parts each cell is to be divided at least, so that motors keep their limits in its middle as
+// well: what exceeds them there falls with the square of the cell.
+std::vector<double> least_parts(const SpeedGrid& grid, const std::vector<double>& z, double least) {
+  std::vector<double> parts(grid.cells(), least);
+  for (std::size_t k = 0; k < grid.cells(); ++k) {
+    const double v = std::sqrt(0.5 * (z[k] + z[k + 1])), q = (z[k + 1] - z[k]) / (2 * grid.step[k]);
+    const double beyond = (motor_use(grid, grid.load(k), v, q) - 1) / over_between_rows;
+    if (beyond > 1) parts[k] = std::max(least, std::ceil(std::sqrt(beyond)));
+  }
+  return parts;
 }
 
 // Power of a robot at standstill that must overcome its friction [W].
@@ -430,12 +443,16 @@ std::vector<double> RunPlanner::with_corners(std::vector<double> nodes) const {
     }
     if (k + 1 < knots.size() && !(std::fabs(slope(k + 1) - slope(k)) < jump_1_m2)) corners.push_back(b.way);
   }
+  std::ranges::sort(corners);
+  double last = 0;
   for (const double corner : corners) {
+    const double before = std::exchange(last, corner);
     const auto after = std::lower_bound(nodes.begin() + 1, nodes.end() - 1, corner);
     if (*after == corner || nodes.size() < 4) continue;
     const auto near =
         after - 1 > nodes.begin() && corner - *(after - 1) < *after - corner ? after - 1 : after;
-    if (near + 1 < nodes.end() && std::fabs(*near - corner) < 0.5 * (*(near + 1) - *(near - 1)))
+    if (*near != before && near + 1 < nodes.end() &&
+        std::fabs(*near - corner) < 0.5 * (*(near + 1) - *(near - 1)))
       *near = corner;
     else
       nodes.insert(after, corner);
@@ -564,8 +581,9 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
     const double most_s = time_tolerance * s.duration_s;
-    if (sum_of(lost_s) <= most_s) break;
-    std::vector<double> finer = split(nodes, lost_s, 0.8 * most_s, 1);
+    const std::vector<double> parts = least_parts(grid, s.z, 1);
+    if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
+    std::vector<double> finer = split(nodes, lost_s, 0.8 * most_s, parts);
     start = resampled(nodes, s.z, finer);
     nodes = std::move(finer);
     grid = grid_over(nodes);
@@ -652,17 +670,23 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
 
 // Divides cells into parts so that their losses add up to at most `most`. A cell's loss is inversely
 // proportional to the number of its parts, so that the fewest nodes result from parts proportional to the
-// square root of the loss.
+// square root of the loss. New nodes are at knots where some are near: between knots loads change evenly.
 std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const std::vector<double>& lost,
-                                      double most, double least_parts) {
+                                      double most, const std::vector<double>& least) const {
   constexpr double most_parts = 8;
   double roots = 0;
   for (const double each : lost) roots += std::sqrt(each);
   std::vector<double> finer{nodes.front()};
   for (std::size_t k = 0; k < lost.size(); ++k) {
     const double wanted = std::ceil(std::sqrt(lost[k]) * roots / most - 0.5);
-    const double parts = nodes.size() > most_cells ? 1 : std::clamp(wanted, least_parts, most_parts);
-    for (double i = 1; i < parts; ++i) finer.push_back(nodes[k] + (nodes[k + 1] - nodes[k]) * i / parts);
+    const double parts = nodes.size() > most_cells ? 1 : std::min(std::max(wanted, least[k]), most_parts),
+                 part = (nodes[k + 1] - nodes[k]) / parts;
+    for (double i = 1; i < parts; ++i) {
+      const double even = nodes[k] + part * i;
+      const auto knot = std::ranges::lower_bound(run_->knots, even - 0.5 * part, {}, &Knot::way);
+      const double way = knot != run_->knots.end() && knot->way < even + 0.5 * part ? knot->way : even;
+      if (way > finer.back() && way < nodes[k + 1]) finer.push_back(way);
+    }
     finer.push_back(nodes[k + 1]);
   }
   return finer;
@@ -730,7 +754,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     lost = lost_j(s, driven, price_w);
     const double most = lost_tolerance * std::fabs(s.cost_j);
     const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
-    if (refined_ && (grown || sum_of(lost) <= most)) break;
+    const std::vector<double> parts = least_parts(*grid_, s.z, refined_ ? 1 : 2);
+    if (refined_ && (grown || (sum_of(lost) <= most && std::ranges::max(parts) == 1))) break;
     const std::vector<double> coarse_nodes = nodes_;
     const auto rebuild = [&](std::vector<double> onto) {
       const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
@@ -750,10 +775,11 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     const auto stands = [](const SpeedSolution& of) { return of.converged && of.residual < most_residual; };
     SpeedSolution finer = solved_on(
         uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
-                              : split(nodes_, lost, 0.8 * most, refined_ ? 1 : 2));
+                              : split(nodes_, lost, 0.8 * most, parts));
     // Where power is concave, some grids make it hard to find an optimum: even halves are the gentlest.
     if (!stands(finer) && !refined_)
-      finer = solved_on(split(coarse_nodes, std::vector<double>(lost.size()), 1, 2));
+      finer = solved_on(
+          split(coarse_nodes, std::vector<double>(lost.size()), 1, std::vector<double>(lost.size(), 2)));
     if (!(refined_ ? stands(finer) : finer.converged)) {
       if (!refined_) s.gap_j = s.cost_j;  // the error of a coarse grid is unknown
       rebuild(coarse_nodes);

@@ -98,8 +98,8 @@ class RunPlanner {
   void add_floor(SpeedGrid& grid) const;
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
-  static std::vector<double> split(const std::vector<double>& nodes, const std::vector<double>& lost,
-                                   double most, double least_parts);
+  std::vector<double> split(const std::vector<double>& nodes, const std::vector<double>& lost, double most,
+                            const std::vector<double>& least) const;
   void add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid) const;
   std::vector<double> first_nodes(std::size_t cells) const;
   std::vector<double> with_corners(std::vector<double> nodes) const;

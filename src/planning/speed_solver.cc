@@ -563,28 +563,26 @@ double SpeedSolver::line_search(double longest, double decrement, double mu, dou
 // Multipliers and the kinks' slopes follow their linearised equations along the step.
 void SpeedSolver::update_duals(double mu) {
   const std::size_t n = grid_.cells();
-  double longest = 1;
+  // Each multiplier keeps a share of itself: one that ends at zero does not shorten the others' steps.
+  const auto follow = [](double& multiplier, double change) {
+    multiplier = std::max((1 - to_boundary) * multiplier, multiplier + change);
+  };
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
     const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
     const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
     const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
-    for (BoundState& b : bounds_of(k)) {
-      const double change =
-          mu / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]);
-      b.slack = change;  // reused until the next assembly
-      shorten(b.multiplier, change, longest);
-    }
+    for (BoundState& b : bounds_of(k))
+      follow(b.multiplier,
+             mu / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]));
     if (half_jump_ != 0) follow_kinks(c, dv, dq);
   }
-  for (BoundState& b : bound_states_) b.multiplier += longest * b.slack;
   for (std::size_t k = 1; k < n; ++k) {
     const double a = 1 / grid_.ceiling[k], d = step_[k] * a;
     const double high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
-    const double up = mu / high - ceiling_multiplier_[k] + ceiling_multiplier_[k] / high * d;
-    const double down = mu / low - floor_multiplier_[k] - floor_multiplier_[k] / low * d;
-    for (auto [multiplier, change] : {std::pair{&ceiling_multiplier_[k], up}, {&floor_multiplier_[k], down}})
-      *multiplier = std::max((1 - to_boundary) * *multiplier, *multiplier + change);
+    double &up = ceiling_multiplier_[k], &down = floor_multiplier_[k];
+    follow(up, mu / high - up + up / high * d);
+    follow(down, mu / low - down - down / low * d);
   }
 }
 
