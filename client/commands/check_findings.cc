@@ -53,8 +53,8 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
   const double rate_hz = tally.bridged > 0 ? sampled_hz : tally.rate_hz();
   if (tally.messages > 1 && (rate_hz < 0.9 * least_rate_hz || rate_hz > 1.1 * greatest_rate_hz))
     add(false, "",
-        fmt::format("{:.4g} messages a second; {} to {} are expected", rate_hz, least_rate_hz,
-                    greatest_rate_hz),
+        fmt::format("{:.4g} messages a second; {} to {} are expected: is the unit of the times right?",
+                    rate_hz, least_rate_hz, greatest_rate_hz),
         rate_hz);
   if (std::string slow = telemetry::slow_stream(sampled_hz); !slow.empty())
     add(false, "", std::move(slow), sampled_hz);

@@ -181,7 +181,9 @@ void check_kinematics(const CheckContext& c, Checks& checks) {
             fmt::format("Where {} turns by 1 rad the wheels turn by {:.3g} rad according to the file: "
                         "half_track_m of {:.3g} m would have to be {} m, {:.3g} times as much{}.",
                         turner, ratio, half_track_m, with_interval(track * half_track_m), ratio,
-                        ratio > 1 ? "; this is usual for skid steering" : ""));
+                        ratio > 1
+                            ? "; skid steering causes this, and so do encoders that are counted twice or more"
+                            : "; encoders of which a part is counted cause this"));
     departs(
         "sides_against_gyro", channel, sides, 0, 0.05,
         fmt::format("By {} the robot turns while both wheels turn alike: the right wheel moves it by {} of "

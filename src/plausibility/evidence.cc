@@ -123,8 +123,8 @@ class Gatherer {
       const std::string motor = std::string("the ") + side_name[k] + " motor's ";
       const Powers powers{{motor_current + k, 1}, {wheel + k, -1}};
       add(motor + "current for acceleration is", "that of the file's inertia",
-          motors_[k].current_per_rad_s2_a * (p_.torque_constant_nm_a / inertia), inertia_off, 6, powers,
-          {.property = P::inertia});
+          motors_[k].current_per_rad_s2_a * (p_.torque_constant_nm_a / inertia), inertia_off, 6,
+          {{motor_current + k, 1}, {wheel + k, -1}, {time_scale, 1}}, {.property = P::inertia});
       const double friction_nm =
           p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * motors_[k].mean_speed_rad_s;
       if (friction_nm > 0)
@@ -145,7 +145,8 @@ class Gatherer {
     for (std::size_t k : {0u, 1u}) {
       add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
           "the turning by the file's track", ratio[k], turn_off, trust_of_sides(ratio, 8),
-          {{by, 1}, {wheel + k, -1}}, {.property = track_by, .turned_by = 1});
+          {{by, 1}, {wheel + k, -1}, {time_scale, by == heading ? -1 : 0}},
+          {.property = track_by, .turned_by = 1});
     }
   }
 
@@ -165,15 +166,16 @@ class Gatherer {
     turning_by_wheels(heading_fit(Relation::heading_wheels), "the map's heading turns", heading,
                       P::map_track);
     add("the map's heading turns", "the gyro's reading", estimate(heading_fit(Relation::heading_gyro), 0),
-        heading_off, 12, {{heading, 1}, {yaw_rate, -1}});
+        heading_off, 12, {{heading, 1}, {yaw_rate, -1}, {time_scale, -1}});
   }
 
   void moving() {
     add("the map moves forward", "the way of the wheels by the file's radius",
-        c_.coefficient(Relation::slip, 0, {1, 2, 3, 4}), travel_off, 12, {{x, 1}, {wheel, -1}},
+        c_.coefficient(Relation::slip, 0, {1, 2, 3, 4}), travel_off, 12,
+        {{x, 1}, {wheel, -1}, {time_scale, -1}},
         {.property = P::radius, .both_sides = true, .lost_by = {heading}});
     add("the map moves", "the way of the wheels by the file's radius",
-        c_.coefficient(Relation::distance, 0, {1}), travel_off, 12, {{x, 1}, {wheel, -1}},
+        c_.coefficient(Relation::distance, 0, {1}), travel_off, 12, {{x, 1}, {wheel, -1}, {time_scale, -1}},
         {.property = P::radius, .magnitude = true, .both_sides = true});
     // The predominant direction of travel is weak evidence for the forward direction.
     add("the way forward, less that backward, is", "all the way that the wheels make",
@@ -206,7 +208,7 @@ class Gatherer {
           {.property = property,
            .by_power = true,
            .both_sides = true,
-           .lost_by = {wheel, wheel + 1, payload}});
+           .lost_by = {wheel, wheel + 1, payload, time_scale}});
     };
     by_model("while the robot drives, the battery's power is", c_.ratio(Relation::driving, 0, 1, 2), 8,
              P::driving_power);

@@ -33,6 +33,9 @@ constexpr bool is_lasting(Property property) {
   return property >= Property::voltage_constant;
 }
 
+// The scale of utime, as a reading of evidence.
+inline constexpr std::size_t time_scale = reading_count;
+
 // How errors of channels act on evidence.
 struct EvidenceTraits {
   Property property = Property::none;

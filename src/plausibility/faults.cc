@@ -26,7 +26,7 @@ struct Combined {
   explicit Combined(const Set& set) {
     factor.fill(1);
     for (const ChannelFault* fault : set) {
-      for (std::size_t k = 0; k < reading_count; ++k) {
+      for (std::size_t k = 0; k < factor.size(); ++k) {
         if (std::fabs(factor[k]) != 1 && std::fabs(fault->factor[k]) != 1)
           surprise = std::numeric_limits<double>::infinity();
         factor[k] *= fault->factor[k];
@@ -35,7 +35,7 @@ struct Combined {
       surprise += fault->surprise;
     }
   }
-  std::array<double, reading_count> factor;
+  std::array<double, time_scale + 1> factor;
   std::uint32_t swaps = 0;
   double surprise = 0;
 };
@@ -234,6 +234,25 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
   if (moved != evidence.end())
     add("pose", "pose.x, pose.y", {x},
         {{"off by a factor that no unit has", moved->ratio.value, odd_nats + 1}});
+  // Times of another scale, with wheel speeds that are measured, or slopes of positions over these times.
+  for (const ChannelEvidence& e : evidence) {
+    const double factor = 1 / e.ratio.value, size = std::max(factor, 1 / factor);
+    if (e.power_of(heading) != 1 || e.power_of(yaw_rate) != -1 || e.trust == 0 ||
+        !(std::log(size) > std::log(least_factor) - same_ratio))
+      continue;
+    for (const double wheels : {1.0, e.ratio.value}) {
+      ChannelFault& fault = all.emplace_back();
+      fault = {"utime_scale",
+               "utime",
+               fmt::format("{:.3g} times too {}", size, factor > 1 ? "long" : "short"),
+               {},
+               0,
+               odd_nats + 2};
+      fault.factor.fill(1);
+      fault.factor[time_scale] = factor;
+      fault.factor[wheel_velocity] = fault.factor[wheel_velocity + 1] = wheels;
+    }
+  }
   return all;
 }
 
@@ -321,13 +340,14 @@ void check_faults(const CheckContext& c, Checks& checks) {
         checks.emplace_back(Check{fault.id, fault.channel, measured.factor, measured.interval, {}, true});
     check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
                              fault.cause, e.says, with_interval(e.ratio), e.against,
-                             contract_of(fault.channel), also(explanation.alternatives[k], measured));
+                             fault.channel == "utime" ? "us since 1970" : contract_of(fault.channel),
+                             also(explanation.alternatives[k], measured));
     // A robot file that is wrong by the factor would look the same.
     const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
     check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);
     const auto factor = std::ranges::find_if(fault.factor, [](double f) { return f != 1; });
     check.swapped = fault.swaps != 0 && check.probability > 0.5;
-    if (factor == fault.factor.end() || check.probability <= 0.5) continue;
+    if (factor == fault.factor.end() || fault.channel == "utime" || check.probability <= 0.5) continue;
     // A unit is a correction only where its own measurement agrees with it.
     if (*factor == -1 || std::fabs(std::log(measured.factor / *factor)) < same_ratio) check.factor = *factor;
   }

@@ -16,13 +16,13 @@ namespace joulecast::plausibility {
 struct ChannelFault {
   std::string id, channel;
   std::string cause;  // "given in rpm"
-  std::array<double, reading_count> factor;
+  std::array<double, time_scale + 1> factor;
   std::uint32_t swaps = 0;  // bits as in EvidenceTraits::turned_by
   double surprise = 0;      // negative log prior probability, in nats
 };
 
-// The catalogue of sign and unit faults, for a robot of these dimensions. A map may have a scale that matches
-// no unit; its factor is taken from the evidence.
+// The catalogue of sign and unit faults, for a robot of these dimensions. A map and a clock may have a scale
+// that matches no unit; its factor is taken from the evidence.
 std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
                                        std::span<const ChannelEvidence> evidence = {});
 

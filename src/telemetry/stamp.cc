@@ -64,16 +64,21 @@ std::optional<minutes> take_offset(std::string& text) {
   return east;
 }
 
+microseconds fraction_of(std::string_view part) {
+  std::string number(part);
+  number.resize(6, '0');
+  return microseconds(std::stol(number));
+}
+
 // Takes the fraction behind the last point off, where a time of day is before it.
 microseconds take_fraction(std::string& text) {
   const std::size_t point = text.rfind('.');
   const std::size_t time = text.find_first_of(": ");
   if (point == std::string::npos || time == std::string::npos || time > point) return microseconds(0);
   const std::size_t end = std::min(text.find_first_not_of(digits, point + 1), text.size());
-  std::string fraction = text.substr(point + 1, end - point - 1);
-  fraction.resize(6, '0');
+  const microseconds fraction = fraction_of(std::string_view(text).substr(point + 1, end - point - 1));
   text.erase(point, end - point);
-  return microseconds(std::stol(fraction));
+  return fraction;
 }
 
 bool is_digit(char c) {
@@ -110,9 +115,7 @@ std::optional<microseconds> take_time_of_day(std::string& stamp, char divider) {
     if (rest.size() > 1 && std::string_view(".,:").find(rest[0]) != std::string_view::npos &&
         is_digit(rest[1])) {
       const std::size_t end = std::min(rest.find_first_not_of(digits, 1), rest.size());
-      std::string part(rest.substr(1, end - 1));
-      part.resize(6, '0');
-      fraction = microseconds(std::stol(part));
+      fraction = fraction_of(rest.substr(1, end - 1));
       rest.remove_prefix(end);
       if (count == 2) parts = {0, parts[0], parts[1]};
     }
@@ -207,13 +210,11 @@ std::optional<microseconds> take_compact_time(std::string& stamp) {
       return std::nullopt;
   }
   if (number.size() < all_but_fraction || stamp.find_first_not_of(digits) < 4) return std::nullopt;
-  std::string part = number.substr(all_but_fraction);
-  part.resize(6, '0');
   const int time = std::stoi(number.substr(date_digits, 6));
   if (time / 10'000 > 24 || time / 100 % 100 > 59 || time % 100 > 60) return std::nullopt;
   stamp = number.substr(0, date_digits);
   return std::chrono::hours(time / 10'000) + minutes(time / 100 % 100) + std::chrono::seconds(time % 100) +
-         microseconds(std::stol(part));
+         fraction_of(std::string_view(number).substr(all_but_fraction));
 }
 
 // Takes a zone's name or abbreviation out: CET, Europe/Berlin.

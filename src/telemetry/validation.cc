@@ -8,8 +8,8 @@
 namespace joulecast::telemetry {
 namespace {
 
-// The channels of a sample in one order, the same as that of the table below.
-constexpr std::array<PlausibleRange, 18> ranges{{
+// In the order of signals::sample_fields.
+constexpr std::array<PlausibleRange, signals::sample_numbers> ranges{{
     {"wheel_velocity[0]", -1e3, 1e3},  // rad/s: 100 m/s on a 0.1 m wheel
     {"wheel_velocity[1]", -1e3, 1e3},
     {"motor_voltage[0]", -1e3, 1e3},  // V
@@ -31,27 +31,6 @@ constexpr std::array<PlausibleRange, 18> ranges{{
 }};
 
 constexpr std::size_t wheel_channels = 2;
-
-std::array<double, ranges.size()> channels(const signals::Sample& s) noexcept {
-  return {s.wheel_velocity_rad_s[0],
-          s.wheel_velocity_rad_s[1],
-          s.motor_voltage_v[0],
-          s.motor_voltage_v[1],
-          s.motor_current_a[0],
-          s.motor_current_a[1],
-          s.battery_voltage_v,
-          s.battery_current_a,
-          s.velocity_command[0],
-          s.velocity_command[1],
-          s.yaw_rate_rad_s,
-          s.pitch_rad,
-          s.pose[0],
-          s.pose[1],
-          s.pose[2],
-          s.motor_temperature_c[0],
-          s.motor_temperature_c[1],
-          s.payload_kg};
-}
 
 // Units that are mistaken for those wanted, and how many of them make one.
 struct MistakenUnit {
@@ -101,9 +80,9 @@ std::optional<Implausible> check_plausible(const signals::Sample& sample) noexce
   if (sample.sequence < 0) {
     return Implausible{Implausibility::bad_sequence, "sequence", static_cast<double>(sample.sequence)};
   }
-  const auto values = channels(sample);
+  const auto values = signals::numbers_of(sample);
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (auto fault = check_value(values[i], ranges[i], i < wheel_channels)) return fault;
+    if (auto fault = check_value(*values[i], ranges[i], i < wheel_channels)) return fault;
   }
   return std::nullopt;
 }

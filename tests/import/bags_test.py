@@ -333,6 +333,16 @@ class Bags(unittest.TestCase):
         drive = Drive(self.samples).wheels().battery().add("/second/battery", "sensor_msgs/BatteryState", lambda s: {"voltage": s["volts"], "current": 0})
         self.assertIn("/second/battery: packs in parallel to /battery_state are not added", self.bring(self.mcap(drive))[1])
 
+    def test_live_battery_is_used(self):
+        """Of two topics, not the first by name or the one with more messages: of another voltage, dead, or without currents."""
+        for voltage, current in ((12, 0.5), (26, 0), (26, math.nan)):
+            drive = Drive(self.samples).wheels().rest().battery(2)
+            drive.add("/aux/battery", "sensor_msgs/BatteryState", lambda s: {"voltage": voltage, "current": -current * (1 + s["amps"])})
+            log, text = self.bring(self.mcap(drive))
+            self.assertIn("/aux/battery: packs in parallel to /battery_state are not added", text)
+            self.assertIn('{"topics": {"battery": "/aux/battery"}} uses it', text)
+            self.assert_same(log, 0.02)
+
     def test_cut_bags_are_named(self):
         bag, base = self.place / "cut.bag", self.place / "cut.db3"
         write_ros1(bag, Drive(self.samples).all())

@@ -80,6 +80,15 @@ Change swap_sides(std::vector<std::size_t> right) {
   };
 }
 
+// Times of another scale, and wheel speeds multiplied.
+Change slower(double scale, double wheels) {
+  return [=](Sample& s, const RobotModel&) {
+    constexpr std::int64_t zero_us = 1'700'000'000'000'000;
+    s.utime_us = zero_us + std::llround(scale * static_cast<double>(s.utime_us - zero_us));
+    for (double& speed : s.wheel_velocity_rad_s) speed *= wheels;
+  };
+}
+
 Change unmeasured_is_0(std::vector<std::size_t> unmeasured) {
   return [=](Sample& s, const RobotModel& robot) {
     fill(unmeasured, 0)(s, robot);
@@ -226,6 +235,9 @@ std::vector<Mistake> all_mistakes() {
        Checked{"utime_scale", "utime"}, Live{K::clock, "utime", true, "ms"}},
       {"utime in ns", [](Sample& s, const RobotModel&) { s.utime_us *= 1000; },
        Checked{"utime_scale", "utime"}, recordings_only},
+      {"utime ten times too long", slower(10, 1), Checked{"utime_scale", "utime"}, recordings_only},
+      {"utime a tenth", slower(0.1, 1), Checked{"utime_scale", "utime"}, recordings_only},
+      {"utime and slopes over it", slower(10, 0.1), Checked{"utime_scale", "utime"}, recordings_only},
       {"utime in s", [](Sample& s, const RobotModel&) { s.utime_us /= 1'000'000; }, unchecked,
        Live{K::clock, "utime", true, "utime"}},
       {"clock set back by 5 min",

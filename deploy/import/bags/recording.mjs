@@ -47,11 +47,16 @@ const kinds = {
 };
 const isTf = (topic) => kinds[topic.kind][0] === linkOf;
 
-// The preferred topic of a role; of equals the one with most messages.
-// Poses in the map's frame come before those of odometry, which drift; a goal is no pose of the robot.
+// The preferred topic of a role; of equals the one with most messages. Of batteries the one whose current
+// changes most often at a voltage of the robot's pack. Poses in the map's frame come before those of
+// odometry, which drift; a goal is no pose of the robot.
 const preferences = {
   wheels: (t) => (t.kind === 'sensor_msgs/JointState' ? 0 : 1) + (/wheel|(^|\/)odom$/.test(t.name) ? 0 : 0.5),
-  battery: () => 0,
+  battery: ({ rows }, robot) =>
+    -rows.filter(({ data: [volts, amps] }, k) => {
+      const share = volts / (robot.battery?.nominal_voltage_v ?? volts);
+      return share > 0.6 && share < 1.5 && Math.abs(amps - rows[k - 1]?.data[1]) > 0;
+    }).length,
   imu: (t) => (/\/data$/.test(t.name) ? 0 : 1),
   command: (t) => (/(^|\/)cmd_vel$/.test(t.name) ? 0 : /cmd|command/.test(t.name) ? 1 : 2),
   pose: (t) => {
@@ -154,7 +159,7 @@ export class Recording {
     if (chosen === null) return [];
     const able = [...this.topics.values()].filter((t) => kinds[t.kind]?.includes(role) && t.rows.length > 0);
     if (chosen === undefined) {
-      const rank = preferences[role];
+      const rank = (t) => preferences[role](t, this.robot);
       return able
         .filter((t) => rank(t) < Infinity)
         .sort((a, b) => rank(a) - rank(b) || b.count - a.count || (a.name < b.name ? -1 : 1));
@@ -347,7 +352,11 @@ export class Recording {
 
     const [battery, ...packs] = this.candidates('battery');
     if (battery) {
-      packs.forEach((t) => this.warn(`${t.name}: packs in parallel to ${battery.name} are not added`));
+      packs.forEach(({ name }) =>
+        this.warn(
+          `${name}: packs in parallel to ${battery.name} are not added; --mapping with {"topics": {"battery": "${name}"}} uses it instead`,
+        ),
+      );
       const reversed = this.choices.battery_current === 'positive_discharging';
       const sign = `, current ${reversed ? 'positive' : 'negative'} while discharging`;
       const [volts, amps] = join('battery', battery, battery.rows, ['voltage', 'current'], sign);
