@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "client/commands/server_answer.h"
 #include "client/wrapped.h"
 #include "signals/gaps.h"
 #include "telemetry/impossible.h"
@@ -168,12 +169,8 @@ void judge_state(const nlohmann::json& state, const std::string& robot_id, Findi
                         c["id"].get<std::string>() + ": " + c["says"].get<std::string>()});
   // Reasons that are no damage.
   constexpr std::array harmless{"restart", "gap", "outside_mission"};
-  for (const auto& [reason, count] : state["faults"].items()) {
-    const nlohmann::json& note = state["fault_notes"].value(reason, nlohmann::json());
-    add(std::ranges::find(harmless, reason) == harmless.end(), "faults",
-        fmt::format("{} {}{}", count.get<std::uint64_t>(), reason,
-                    note.is_string() ? ": " + note.get<std::string>() : ""));
-  }
+  for (const auto& fault : state["faults"].items())
+    add(std::ranges::find(harmless, fault.key()) == harmless.end(), "faults", fault_text(state, fault.key()));
   if (!state["has_model"].get<bool>())
     add(true, "has_model", "the daemon has no model of this robot: its energy is not counted");
 }

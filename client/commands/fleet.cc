@@ -62,7 +62,7 @@ void print_state(const Json& s, const std::string& unit) {
          fmt::format("{} since {}, {} {}", text_of(s["mission"]["mission_id"]),
                      to_second(s["mission"]["start"]),
                      energy_text(number_or_nan(member_at(s, "mission/energy/battery_j")), unit), unit));
-  for (const auto& [reason, count] : s["faults"].items()) line("fault", reason + ": " + count.dump());
+  for (const auto& fault : s["faults"].items()) line("fault", fault_text(s, fault.key()));
   for (const Json& each : s["contradictions"]) line("conflict", text_of(each["says"]));
 }
 

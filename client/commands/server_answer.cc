@@ -46,6 +46,12 @@ std::string robot_target(const std::string& robot_id, const std::string& part) {
   return "/v1/robots/" + percent_encoded(robot_id) + part;
 }
 
+std::string fault_text(const Json& state, const std::string& reason) {
+  const Json& notes = state["fault_notes"];
+  const auto note = notes.find(reason);
+  return state["faults"][reason].dump() + ' ' + reason + (note == notes.end() ? "" : ": " + text_of(*note));
+}
+
 Query query_of(const std::vector<Given>& given) {
   Query query;
   for (const Given& each : given) query.emplace_back(each.member, text_of(each.value));

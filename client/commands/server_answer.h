@@ -58,6 +58,9 @@ Row<Options> unit_row() {
           one_of(energy_units)};
 }
 
+// "3 bad_event: mission b ends, ...", of one of the faults of a robot's state.
+[[nodiscard]] std::string fault_text(const Json& state, const std::string& reason);
+
 // Keys and values of a query.
 using Query = std::vector<std::pair<std::string, std::string>>;
 

@@ -56,6 +56,8 @@ def names_end_of_another_mission(options, programs, robot):
     programs.put("/v1/robots/amr", json.load(open(robot)))
     programs.run("replay", other, "--lcm-url", programs.lcm_url, "--speed", "0")
     wait_until(lambda: sentence in programs.get("/v1/robots/amr/state")["fault_notes"].get("bad_event", ""), 2, "the state names the mission that ends")
+    state = programs.run("state", "amr", "--server", programs.url)
+    check(f"fault      1 bad_event: mission {sentence}" in state, f"the printed state names the mission that ends:\n{state}")
     check(sentence in open(programs.path("daemon.log")).read(), "the daemon's log names the mission that ends")
     mission, = programs.missions("amr")
     check(mission["mission_id"] == "amr-s7-m1" and mission["state"] == "superseded" and "holds mission amr-s7-m9 too" in mission["note"], f"{mission}")

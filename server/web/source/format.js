@@ -143,7 +143,7 @@ export function clock(utimeUs) {
 // "1 robot", "3 robots".
 export const count = (n, noun, several = `${noun}s`) => `${fixed(n)} ${n === 1 ? noun : several}`;
 
-export const words = (name) => name.replaceAll('_', ' ');
+export const words = (name) => name.replace(/^com_/, 'centre_of_mass_').replaceAll('_', ' ');
 
 // "name: value; …" of an object's members that are not null.
 export const members = (object) =>

@@ -23,7 +23,12 @@ function telemetryOf(state) {
   if (!state.has_model) return { level: 'bad', text: 'no model' };
   if (state.live) return { level: 'good', text: 'live' };
   if (unheard(state)) return { level: 'none', text: 'no telemetry yet' };
-  return { level: 'bad', text: `silent since ${since(state.heardUs)}` };
+  const text = (
+    <span>
+      silent since <span class="number">{since(state.heardUs)}</span>
+    </span>
+  );
+  return { level: 'bad', text };
 }
 
 // The most urgent reason, and the number of the others; silence is in the line above. The state contains

@@ -135,7 +135,7 @@ export async function reloadFleet() {
     state.error = error;
   }
   loading = false;
-  changed();
+  requestAnimationFrame(tell); // at once: the view was empty or out of date
 }
 
 function connect() {

@@ -109,7 +109,7 @@ function WithField({ of, value, onChange }) {
     .map((m) => [m.id, `${m.mission_id}, ${format.time(m.start_utime_us).slice(0, 16)}`]);
   return (
     <SelectField
-      label={`Over it, of ${of.robot_id}`}
+      label={`Overlay another mission of ${of.robot_id}`}
       value={value}
       onChange={onChange}
       options={[['', 'no other mission'], ...options]}

@@ -144,16 +144,16 @@ function Zones({ map, onMark }) {
 // Energy over the expectation of the models, of a square with a known departure.
 const excessOf = ({ departure: d, measured_j: measured }) => (measured * d) / (1 + d);
 
-function Squares({ map, weeks }) {
+function Squares({ map }) {
   const narrow = useNarrow();
   const most = map.cells.filter((c) => c.departure !== null);
   most.sort((a, b) => excessOf(b) - excessOf(a));
   const shown = most.slice(0, listed);
-  const excess = energyScale(shown.map((c) => excessOf(c) / weeks));
+  const excess = energyScale(shown.map(excessOf));
   const spent = energyScale(shown.map((c) => c.energy_j));
   const columns = [
     column('square', 'Square', (c) => square(c, map.cell_m), { head: true }),
-    figure('excess', 'Excess a week', (c) => <Quantity of={energyIn(excess, excessOf(c) / weeks)} sign />),
+    figure('excess', 'Excess', (c) => <Quantity of={energyIn(excess, excessOf(c))} sign />),
     figure('departure', 'Departure', (c) => share(c.departure)),
     figure('energy', 'Energy', (c) => energyIn(spent, c.energy_j)),
     figure('missions', 'Missions', (c) => format.fixed(c.missions)),
@@ -184,7 +184,7 @@ function Summary({ map }) {
   return <Readouts large rows={rows} />;
 }
 
-function Shown({ map, show, weeks, stale }) {
+function Shown({ map, show, stale }) {
   const [marked, setMarked] = useState(null);
   const subject = subjects[show]();
   const here = marked && map.cells.find((c) => c.x_m === marked.x_m && c.y_m === marked.y_m);
@@ -208,7 +208,7 @@ function Shown({ map, show, weeks, stale }) {
           <Panel title="Zones">
             <Zones map={map} onMark={setMarked} />
           </Panel>
-          <Squares map={map} weeks={weeks} />
+          <Squares map={map} />
         </div>
       </div>
       {map.cells.length < map.cells_total && (
@@ -228,7 +228,6 @@ export function Floor({ given: asked }) {
   const show = given.show in subjects ? given.show : 'gap';
   const filter = filterOf(given);
   const none = misordered(given.from, given.to);
-  const weeks = ((filter.to_utime_us ?? Date.now() * 1000) - filter.from_utime_us) / (7e3 * dayMs);
   const map = useGet(none ? null : `/v1/floor-map${query({ ...filter, limit: 20_000, digits: 7 })}`);
   return (
     <>
@@ -252,7 +251,7 @@ export function Floor({ given: asked }) {
         <Misordered />
       ) : (
         <Answer of={map} what="the floor">
-          {(value) => <Shown map={value} show={show} weeks={weeks} stale={map.loading} />}
+          {(value) => <Shown map={value} show={show} stale={map.loading} />}
         </Answer>
       )}
     </>

@@ -98,7 +98,7 @@ export function SpeedChart({ answer }) {
 // The energy cost of a shorter duration, if the robot can be faster.
 export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW }, shortestS) {
   if (durationS <= shortestS * 1.001) return 'no shorter time is possible: the robot is at its limits';
-  if (!(priceW >= 0.005)) return 'the duration of least energy';
+  if (!(priceW >= 0.005)) return 'this is the duration of least energy';
   const price = `${format.text(energy(priceW))} per second or more`;
   return durationS - shortestS < 1 ? `less time costs ${price}` : `one second less costs ${price}`;
 }

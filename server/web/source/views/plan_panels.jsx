@@ -22,7 +22,7 @@ export function Certificate({ answer }) {
     ['Computed by', methods[c.method] ?? format.words(c.method)],
     ['Above the optimum', above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.share(above)}`],
     ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
-    ['In less time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
+    ['A shorter time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
     [
       'Shortest time',
       format.known(c.shortest_time_s)

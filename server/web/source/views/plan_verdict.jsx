@@ -39,7 +39,7 @@ function Drives({ drives }) {
     column('name', 'Drive', (d) => d.name, { head: true }),
     figure('chance', 'Chance', (d) => chance(d.success_probability), long),
     figure('energy', 'Expected energy', (d) => energyIn(scale, d.expected_energy_j), long),
-    figure('time', 'Time', (d) => format.about(d.duration_s)),
+    figure('time', 'Time', (d) => format.about(d.duration_s), long),
     figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), long),
   ];
   return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;

@@ -56,32 +56,27 @@ function Charts({ trace, mission, setZoom, setCursor }) {
     drag: { x: true, y: false, setScale: false, dist: 6 },
     bind: { dblclick: () => () => setZoom(null) },
   };
-  const timeAxis = (label) => axis(label, { size: 28, incrs: clockSteps, values: runClock });
-  const makePower = () => {
-    const p = palette();
+  // `quantities(palette)`: [colour, width, opacity of the band from least to greatest].
+  const maker = (time, value, quantities) => () => {
+    const shown = quantities(palette());
     const none = line('transparent');
     return {
       cursor,
       hooks,
-      axes: [timeAxis(''), axis('power, W')],
-      bands: [
-        { series: [1, 2], fill: withAlpha(p.measured, 0.2) },
-        { series: [4, 5], fill: withAlpha(p.modelled, 0.16) },
-      ],
-      series: [{}, none, none, line(p.measured, 2.75), none, none, line(p.modelled, 1)],
+      axes: [axis(time, { size: 28, incrs: clockSteps, values: runClock }), axis(value)],
+      bands: shown.map(([colour, , share], k) => ({
+        series: [3 * k + 1, 3 * k + 2],
+        fill: withAlpha(colour, share),
+      })),
+      series: [{}, ...shown.flatMap(([colour, width]) => [none, none, line(colour, width)])],
     };
   };
-  const makeSpeed = () => {
-    const p = palette();
-    const none = line('transparent');
-    return {
-      cursor,
-      hooks,
-      axes: [timeAxis('time since the start'), axis('speed, m/s')],
-      bands: [{ series: [1, 2], fill: withAlpha(p.ink, 0.12) }],
-      series: [{}, none, none, line(p.ink)],
-    };
-  };
+  const powers = (p) => [
+    [p.measured, 2.75, 0.2],
+    [p.modelled, 1, 0.16],
+  ];
+  const makePower = maker('', 'power, W', powers);
+  const makeSpeed = maker('time since the start', 'speed, m/s', (p) => [[p.ink, 1.5, 0.12]]);
   // Keys move the cursor over both charts and zoom around it.
   const plots = useRef([]);
   const at = useRef(0);

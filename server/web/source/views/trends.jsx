@@ -36,6 +36,7 @@ const lasts = [
   ['182', '26 weeks'],
 ];
 const dayMs = 86_400_000;
+const fewest = 8; // periods that the time axis spans, so that the bar of a single one stays narrow
 const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
 
 const totalsPath = (filter) => `/v1/mission-totals${query(filter)}`;
@@ -75,14 +76,16 @@ async function readSides(periods, robots, signal) {
   return { now, before, sides };
 }
 
+// Most ids of missions begin with the robot's.
+const nameOf = ({ robot_id: robot, mission_id: id }) => (id.startsWith(robot) ? id : `${robot} ${id}`);
+
 // The same of single missions.
 const readMissions = (ids, signal) =>
   Promise.all(
     ids.map(async (id) => {
       const path = `/v1/missions/${encodeURIComponent(id)}`;
       const [mission, { ledger }] = await Promise.all([get(path, signal), get(`${path}/ledger`, signal)]);
-      const name = `${mission.robot_id} ${mission.mission_id}`;
-      return { name, link: missionLink(id), totals: { ...mission, ledger } };
+      return { name: nameOf(mission), link: missionLink(id), totals: { ...mission, ledger } };
     }),
   );
 
@@ -156,7 +159,7 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
       cursor: {},
       padding: [8, 44, 0, 0],
       scales: {
-        x: timesWith((spanS) => Math.max(wide, 0.08 * spanS)),
+        x: timesWith((spanS) => Math.max(0.08 * spanS, ((fewest * periodMs) / 1000 - spanS) / 2)),
         y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
       },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
@@ -297,6 +300,7 @@ function Sides({ sides }) {
   const figures = measuresOf(tariff, joules)
     .filter(({ of }) => totals.some((t) => of(t) !== undefined))
     .map((measure) => ({ ...measure, name: measure.title, values: totals.map(measure.of) }));
+  const consumed = figures.findIndex(({ key }) => key === 'consumption') + 1;
   const over = (t, term) =>
     t.energy.distance_m > 0.1 ? effectOn(term, t.ledger?.terms_j[term] ?? 0) / t.energy.distance_m : null;
   const terms = Object.keys(totals[0].ledger?.terms_j ?? {})
@@ -334,7 +338,7 @@ function Sides({ sides }) {
       aside={links.length > 0 && aside}
       class="compare"
       columns={columns}
-      rows={[...figures, ...terms]}
+      rows={[...figures.slice(0, consumed), ...terms, ...figures.slice(consumed)]}
       keyOf={(r) => r.name}
     />
   );
@@ -344,7 +348,7 @@ function MissionsField(more) {
   const recent = useGet('/v1/missions?limit=200').value?.missions ?? [];
   const options = recent.map((m) => [
     String(m.id),
-    `${m.robot_id} ${m.mission_id} ${format.time(m.start_utime_us).slice(0, 16)}`,
+    `${nameOf(m)} ${format.time(m.start_utime_us).slice(0, 16)}`,
   ]);
   return <Several label="Missions" one="Mission" options={options} none="choose …" {...more} />;
 }
