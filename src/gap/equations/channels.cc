@@ -128,11 +128,6 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
   return {battery, motor[0] + motor[1], motor};
 }
 
-template <class S>
-S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
-  return metered_powers(model, w).battery_w;
-}
-
 void keep_known_motion(std::vector<Window>& windows) {
   std::erase_if(windows, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
 }
@@ -186,7 +181,8 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   const S bus = p.idle_power_w + p.accessory_power_w + motor_power[0] + motor_power[1] +
                 p.driver_loss * motor_abs + p.unreturned * braking;
   r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.mission_voltage_v);
-  if (from_motion.power) r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
+  if (from_motion.power)
+    r[index_of(Channel::power)] = S(w.battery_power_w) - metered_powers(model, w).battery_w;
   // The difference of the open-circuit voltage from the nominal one is a nuisance of its own.
   r[index_of(Channel::battery_voltage)] =
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
@@ -202,8 +198,6 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   return r;
 }
 
-template double metered_power(const dynamics::BasicDriveModel<double>&, const Window&);
-template Dual metered_power(const dynamics::BasicDriveModel<Dual>&, const Window&);
 template MeteredPower<double> metered_powers(const dynamics::BasicDriveModel<double>&, const Window&);
 template MeteredPower<Dual> metered_powers(const dynamics::BasicDriveModel<Dual>&, const Window&);
 template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&,

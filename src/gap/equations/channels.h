@@ -66,11 +66,8 @@ extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDri
 // Removes windows with unknown motion.
 void keep_known_motion(std::vector<Window>& windows);
 
-// The battery power that the motion needs, as the robot's meter would read it [W].
-template <class S>
-S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w);
-
-// The same, and the electrical power of both motors as their sensors would read it [W].
+// The battery power that the motion needs, as the robot's meter would read it, and the electrical power of
+// both motors as their sensors would read it [W].
 template <class S>
 struct MeteredPower {
   S battery_w = 0, motors_w = 0;
@@ -79,8 +76,6 @@ struct MeteredPower {
 template <class S>
 MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w);
 
-extern template double metered_power(const dynamics::BasicDriveModel<double>&, const Window&);
-extern template dynamics::Dual metered_power(const dynamics::BasicDriveModel<dynamics::Dual>&, const Window&);
 extern template MeteredPower<double> metered_powers(const dynamics::BasicDriveModel<double>&, const Window&);
 extern template MeteredPower<dynamics::Dual> metered_powers(const dynamics::BasicDriveModel<dynamics::Dual>&,
                                                             const Window&);

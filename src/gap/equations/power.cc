@@ -55,7 +55,7 @@ std::vector<double> modelled_power(const robot::RobotModel& robot,
       model.reset();
     }
     if (!model) model.emplace(robot, effects);
-    power[k] = metered_power(*model, windows[k]);
+    power[k] = metered_powers(*model, windows[k]).battery_w;
   }
   return power;
 }

@@ -82,12 +82,11 @@ class Comparer {
 
   // Energy per metre of each group by these powers of rows.
   std::vector<double> per_m(const Eigen::VectorXd& power_w, bool offset) const {
-    std::vector<double> energy_j(groups_, 0), way_m(groups_, 0);
-    for (std::size_t r = 0; r < grouped_.joule.size(); ++r) {
+    std::vector<double> energy_j(groups_, 0);
+    for (std::size_t r = 0; r < grouped_.joule.size(); ++r)
       energy_j[group_of(r)] += grouped_.joule[r] * power_w[ix(r)] + (offset ? grouped_.offset_j[r] : 0);
-      way_m[group_of(r)] += grouped_.way_m[r];
-    }
-    for (std::size_t g = 0; g < groups_; ++g) energy_j[g] /= way_m[g] > 0 ? way_m[g] : missing;
+    for (std::size_t g = 0; g < groups_; ++g)
+      energy_j[g] /= c_.groups[g].way_m > 0 ? c_.groups[g].way_m : missing;
     return energy_j;
   }
 
@@ -97,19 +96,17 @@ class Comparer {
     d.noise_floor = d.energy_relative = d.power_absolute_relative = missing;
     for (ComparedGroup& group : c_.groups) group.energy_per_m_j = group.model_per_m_j = missing;
     if (!fit().data.power) return;
-    const auto& rows = fit().data.rows;
-    const Eigen::VectorXd measured = rows.measured_w();
+    for (std::size_t r = 0; r < grouped_.way_m.size(); ++r) c_.groups[group_of(r)].way_m += grouped_.way_m[r];
+    const Eigen::VectorXd measured = fit().data.rows.measured_w();
     const std::vector<double> taken = per_m(measured, true), by_model = per_m(fit().unchanged_w, true);
-    std::vector<double> way_m(groups_, 0);
-    for (std::size_t r = 0; r < rows.size(); ++r) way_m[group_of(r)] += grouped_.way_m[r];
     double all = 0, missed = 0;
     for (std::size_t g = 0; g < groups_; ++g) {
-      c_.groups[g].way_m = way_m[g];
-      c_.groups[g].energy_per_m_j = taken[g];
-      c_.groups[g].model_per_m_j = by_model[g];
+      ComparedGroup& group = c_.groups[g];
+      group.energy_per_m_j = taken[g];
+      group.model_per_m_j = by_model[g];
       if (!std::isfinite(taken[g])) continue;
-      all += way_m[g] * taken[g];
-      missed += way_m[g] * (taken[g] - by_model[g]);
+      all += group.way_m * taken[g];
+      missed += group.way_m * (taken[g] - by_model[g]);
     }
     d.energy_relative = missed / all;
     d.power_absolute_relative = (measured - fit().unchanged_w).cwiseAbs().mean() / measured.cwiseAbs().mean();

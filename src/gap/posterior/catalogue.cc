@@ -45,7 +45,7 @@ bool shown(const Data& d, std::string_view id) {
   return d.witness == Witness::kinematics ? contains(kinematic, id) : !contains(need_channels, id);
 }
 
-// What the recorded motion can show.
+// Sizes and kinds of the recorded motion.
 struct Motion {
   double mean_rad_s = 0, fastest_rad_s = 0.1;  // of a wheel; fastest: 98 %
   double payload_kg = 0;

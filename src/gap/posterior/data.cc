@@ -194,7 +194,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     d.rows = {};
     double sum = 0;
     const dynamics::DriveModel model(robot, d.in_file);
-    for (const Window& w : d.windows) sum += std::fabs(metered_power(model, w));
+    for (const Window& w : d.windows) sum += std::fabs(metered_powers(model, w).battery_w);
     d.mean_power_w = std::max(sum / static_cast<double>(d.windows.size()), 1e-3);
   }
   return d;

@@ -105,7 +105,7 @@ struct Data {
   PowerRows sides;                      // the motors one against the other, in rows of their own
   std::vector<Eigen::VectorXd> shifts;  // of each table: power of its rows, with a common shift
 
-  // True if the rows are instants of recordings, whose power has a table of terms; not runs, not groups.
+  // True if the rows are instants of recordings, not runs and not groups: power has a table of terms.
   bool of_instants() const { return conditions.empty() && group.empty() && rows.meter.empty(); }
   // True if battery power is the only evidence.
   bool at_readings() const { return power && !motors; }

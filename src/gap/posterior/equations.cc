@@ -131,7 +131,7 @@ class Builder {
     Eigen::VectorXd share(ix(e_.effects));
     for (std::size_t k = 0; k < e_.effects; ++k) {
       double size = 0;
-      for (const Window& w : d_.windows) size += std::fabs(slope(metered_power(models_[k], w)));
+      for (const Window& w : d_.windows) size += std::fabs(slope(metered_powers(models_[k], w).battery_w));
       share[ix(k)] = size / (static_cast<double>(d_.windows.size()) * d_.mean_power_w);
     }
     return share;

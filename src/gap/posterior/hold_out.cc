@@ -202,6 +202,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   for (std::size_t c = 0; c < errors.size(); ++c)
     errors[c].left = Eigen::VectorXd::Constant(e.channels[c].y.size(), missing);
   std::vector<HeldOut::Block> blocks(d.blocks);
+  out.explained_w = Eigen::VectorXd::Constant(ix(n), missing);
   for (int k = 0; k < static_cast<int>(folds); ++k) {
     std::vector<double> weights(d.blocks);
     for (std::size_t b = 0; b < d.blocks; ++b) weights[b] = fold_of(b) == k ? 0 : 1;
@@ -218,11 +219,14 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     for (std::size_t r = 0; r < n; ++r) {
       if (fold_of(d.rows.window(r).block) == k) tested.push_back(ix(r));
     }
+    if (tested.empty()) continue;
+    const Eigen::VectorXd power_w = explained_power(fit, p, weights);
+    out.explained_w(tested) = power_w(tested);
     const double few = static_cast<double>(d.fewest);
     if (static_cast<double>(tested.size()) < least_tested_rows * few ||
         static_cast<double>(n - tested.size()) < least_trained_rows * few)
       continue;
-    const Eigen::VectorXd explained = measured - explained_power(fit, p, weights);
+    const Eigen::VectorXd explained = measured - power_w;
     const Eigen::VectorXd by_terms = measured - regressed(d, terms, weights);
     for (const Eigen::Index r : tested) {
       HeldOut::Block& own = blocks[d.rows.window(ux(r)).block];

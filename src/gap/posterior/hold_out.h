@@ -24,8 +24,9 @@ struct HeldOut {
   double repeats_left = missing;  // repeated_part() where power has rows of its own
   // Of each requested effect: the part of its set's reduction that returns without it, formula (6).
   std::vector<double> share;
-  std::vector<Block> blocks;  // with rows that were left out
-  bool known = false;         // enough rows in enough folds
+  std::vector<Block> blocks;    // with rows that were left out
+  Eigen::VectorXd explained_w;  // by row of power, left out; NaN: it was not
+  bool known = false;           // enough rows in enough folds
 };
 
 // 95 % interval of the part of the file's error that the explanation removes; NaN of fewer than two blocks.

@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t max_held_out_levels = 8;  // of a condition to be left out one by one
 
 // Progress of the stages, as parts of the whole.
-constexpr double after_search = 0.6, after_parts = 0.8;
+constexpr double after_search = 0.6;
 constexpr double least_visible_share = 0.002;  // of a run's energy within the bounds of an effect
 
 double mean_absolute_normal(double sd) {
@@ -80,8 +80,6 @@ class RunDiagnoser {
     answer_ = posterior::explain(*fit_);
     report(after_search);
     judge_runs();
-    hold_out_parts();
-    report(after_parts);
     hold_out_conditions();
     find_invisible();
     add_limits();
@@ -118,9 +116,11 @@ class RunDiagnoser {
   void judge_runs() {
     Diagnosis& d = r_.diagnosis;
     double power_w = 0;
-    const std::vector<double> after = rows_.energies_j(answer_.explained_w);
+    const std::vector<double> after = rows_.energies_j(answer_.explained_w),
+                              held_out = rows_.energies_j(answer_.held_out.explained_w);
     for (std::size_t k = 0; k < set_.runs.size(); ++k) {
       r_.runs[k].after_j = after[k];
+      if (std::isfinite(held_out[k])) r_.runs[k].held_out_j = held_out[k];
       power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
     }
     // Spreads, corrected for the degrees of freedom of the fit of all columns; the sides come first.
@@ -156,20 +156,6 @@ class RunDiagnoser {
       if (terms.x.col(at).isZero(0)) continue;
       b.terms.push_back(
           {terms.names[k], terms.units[k], data.coefficients[at], data.sd[at], model.coefficients[at]});
-    }
-  }
-
-  // Predicts each run without its part of the table.
-  void hold_out_parts() {
-    const std::size_t blocks = rows_.data().blocks, parts = std::min(posterior::folds, blocks);
-    for (std::size_t part = 0; part < parts; ++part) {
-      std::vector<double> weights(blocks, 1.0);
-      for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
-      const posterior::Without without = posterior::predict_without(*fit_, weights);
-      const std::vector<double> explained = rows_.energies_j(without.explanation_w);
-      for (std::size_t k = 0; k < explained.size(); ++k) {
-        if (weights[block_of(k)] == 0) r_.runs[k].held_out_j = explained[k];
-      }
     }
   }
 

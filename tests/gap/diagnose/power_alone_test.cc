@@ -41,7 +41,7 @@ TEST(PowerAlone, AppliesBiasAtMissionVoltage) {
   w.mission_voltage_v = 24;
   for (const double own_v : {20.0, 28.0}) {
     w.battery_voltage_v = own_v;
-    EXPECT_NEAR(metered_power(model, w).slope, 24, 1e-9);
+    EXPECT_NEAR(metered_powers(model, w).battery_w.slope, 24, 1e-9);
   }
 }
 

@@ -149,7 +149,7 @@ TEST(NoisySpeed, MassStaysUnknown) {
   Window w;
   w.speed_rad_s = {6, 6};
   w.battery_voltage_v = 24;
-  const double power_w = metered_power(model, w);
+  const double power_w = metered_powers(model, w).battery_w;
   for (telemetry::Recording& mission : recordings.missions) {
     for (signals::Sample& s : mission.samples) {
       for (double& speed : s.wheel_velocity_rad_s) speed = 6 + 0.1 * normal(random);

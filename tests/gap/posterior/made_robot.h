@@ -54,7 +54,7 @@ struct Drives {
         }
         w.battery_voltage_v = volts;
         s.battery_voltage_v = volts;
-        s.battery_current_a = (metered_power(model, w) + load_w(t) + noise(random)) / volts;
+        s.battery_current_a = (metered_powers(model, w).battery_w + load_w(t) + noise(random)) / volts;
         mission.samples.push_back(s);
       }
       missions.push_back(std::move(mission));
