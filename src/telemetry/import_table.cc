@@ -134,9 +134,10 @@ void ImportTable::detect_decimal() {
   for (int k = 0; k < probed && rows.next(row_).value_or(false); ++k)
     for (std::size_t column = 0; column < row_.size(); ++column) {
       const std::string_view cell = without_unit(trimmed(row_[column]));
+      if (cell.empty()) continue;
       const std::size_t at = cell.find_last_of(",.");
       const char sign = at == std::string_view::npos ? '\0' : cell[at];
-      if (!cell.empty() && cell.size() < 4 && sign == '\0') small.insert(column);
+      if (cell.size() < 4 && sign == '\0') small.insert(column);
       if (sign == '\0' || !parse_number(cell, sign == ',', true)) continue;
       ++numbers[sign];
       if (RE2::FullMatch(cell, groups_of(sign)))
@@ -307,14 +308,11 @@ std::vector<std::string> ImportTable::notes() const {
   if (!encoding().empty()) notes.push_back("the text is in " + encoding());
   if (format().skip_lines > layout_.format.skip_lines)
     notes.push_back(fmt::format("{} lines before the header are left out", format().skip_lines));
-  if (grouped_)
-    notes.push_back(
-        fmt::format("the '{}' in numbers is between groups of three digits", decimal_comma_ ? '.' : ','));
-  if (decimal_comma_ || (layout_.format.separator == '\0' && format().separator != ','))
-    notes.push_back(
-        fmt::format("the separator is {}, the decimal sign '{}'",
-                    format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
-                    decimal_comma_ ? ',' : '.'));
+  if (decimal_comma_ || grouped_ || (layout_.format.separator == '\0' && format().separator != ','))
+    notes.push_back(fmt::format(
+        "the separator is {}, the decimal sign '{}'{}",
+        format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
+        decimal_comma_ ? ',' : '.', grouped_ ? ", the other between groups of three digits" : ""));
   if (timeless_ > 0)
     notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,
                                 first_timeless_->field));
