@@ -355,6 +355,7 @@ void RobotSession::place(const signals::Sample& sample) {
   Received received{sample, sample};
   if (auto dropped = impossible_->drop(received.possible))
     on_fault(IngestFault::impossible, 1, std::move(dropped->why));
+  if (telemetry::lacks_motion(received.possible)) return;
   signals::Sample trusted = received.possible;
   if (open_ == nullptr && held_.empty()) charge_before_ = charge_->memory_json();
   if (contradictions_->doubts_battery())

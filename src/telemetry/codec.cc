@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <boost/endian/conversion.hpp>
 #include <joulecast/energy_state_t.hpp>
 #include <joulecast/mission_event_t.hpp>
 #include <joulecast/robot_covariates_t.hpp>
@@ -40,12 +41,6 @@ std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
   return signals::is_valid_mission_id(text) ? "" : "may contain only letters, digits, '.', '_' and '-'";
 }
 
-std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t size) noexcept {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < size; ++i) value = value << 8 | bytes[i];
-  return value;
-}
-
 // Walks the declared layout of a message over its bytes without reading a value it has not checked to be
 // there. The first fault sticks; later steps do nothing.
 class Guard {
@@ -57,7 +52,7 @@ class Guard {
       return;
     }
     const std::uint8_t* at = take(8, "fingerprint");
-    if (at != nullptr && read_big_endian(at, 8) != static_cast<std::uint64_t>(fingerprint)) {
+    if (at != nullptr && boost::endian::load_big_s64(at) != fingerprint) {
       refuse("fingerprint", "is not that of the type: another type or another version of it");
     }
   }
@@ -67,7 +62,7 @@ class Guard {
   void text(const char* field, Text kind, std::size_t max_length) {
     const std::uint8_t* head = take(4, field);
     if (head == nullptr) return;
-    const std::uint64_t declared = read_big_endian(head, 4);  // includes the terminating NUL
+    const std::uint64_t declared = boost::endian::load_big_u32(head);  // includes the terminating NUL
     const std::size_t left = bytes_.size() - position_;
     if (declared < 1 || declared > left) {
       refuse(field, "declares a length of " + std::to_string(declared) + " bytes where 1 to " +
@@ -89,7 +84,7 @@ class Guard {
   std::size_t count(const char* field, std::size_t most) {
     const std::uint8_t* at = take(4, field);
     if (at == nullptr) return 0;
-    const auto value = static_cast<std::int32_t>(read_big_endian(at, 4));
+    const std::int32_t value = boost::endian::load_big_s32(at);
     if (value >= 0 && static_cast<std::size_t>(value) <= most) return static_cast<std::size_t>(value);
     refuse(field, "is " + std::to_string(value) + "; 0 to " + std::to_string(most) + " are allowed");
     return 0;
@@ -205,8 +200,8 @@ constexpr std::size_t max_covariate_text = 2 * signals::max_covariate_name_lengt
 }  // namespace
 
 bool is_signed(std::span<const std::uint8_t> bytes) {
-  static const auto fingerprint = static_cast<std::uint64_t>(signed_message_t::getHash());
-  return bytes.size() >= 8 && read_big_endian(bytes.data(), 8) == fingerprint;
+  static const std::int64_t fingerprint = signed_message_t::getHash();
+  return bytes.size() >= 8 && boost::endian::load_big_s64(bytes.data()) == fingerprint;
 }
 
 Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes) {
@@ -220,8 +215,8 @@ Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes) {
   guard.fixed(size, "content");
   guard.fixed(message.mac.size(), "mac");
   TRY(guard.finish());
-  message.utime_us = static_cast<std::int64_t>(read_big_endian(bytes.data() + 8, 8));
-  message.sequence = static_cast<std::int64_t>(read_big_endian(bytes.data() + 16, 8));
+  message.utime_us = boost::endian::load_big_s64(bytes.data() + 8);
+  message.sequence = boost::endian::load_big_s64(bytes.data() + 16);
   message.content = bytes.subspan(head, size);
   std::ranges::copy(bytes.subspan(head + size), message.mac.begin());
   return message;
@@ -248,19 +243,15 @@ Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
   TRY(guard.finish());
 
   const std::uint8_t* at = bytes.data() + 8;  // past the fingerprint
-  const auto next = [&at](std::size_t size) {
-    const std::uint64_t value = read_big_endian(at, size);
-    at += size;
-    return value;
-  };
   DecodedTelemetry result;
-  result.sample.utime_us = static_cast<std::int64_t>(next(8));
-  result.sample.sequence = static_cast<std::int64_t>(next(8));
-  const auto length = static_cast<std::size_t>(next(4));  // with its NUL
-  result.robot_id.assign(reinterpret_cast<const char*>(at), length - 1);
-  at += length;
+  result.sample.utime_us = boost::endian::load_big_s64(at);
+  result.sample.sequence = boost::endian::load_big_s64(at + 8);
+  const std::size_t length = boost::endian::load_big_u32(at + 16);  // with its NUL
+  result.robot_id.assign(reinterpret_cast<const char*>(at + 20), length - 1);
+  at += 20 + length;
   signals::visit_fields(result.sample, [&](const signals::SampleField&, double& number) {
-    number = std::bit_cast<double>(next(real));
+    number = std::bit_cast<double>(boost::endian::load_big_u64(at));
+    at += real;
   });
   return result;
 }

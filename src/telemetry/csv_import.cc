@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <span>
 #include <string>
 #include <utility>
@@ -17,6 +17,7 @@
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/import_table.h"
+#include "telemetry/impossible.h"
 #include "telemetry/sequence_tracker.h"
 
 namespace joulecast::telemetry {
@@ -113,10 +114,6 @@ std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
   return restarts;
 }
 
-double seconds(std::int64_t from_us, std::int64_t to_us) {
-  return 1e-6 * static_cast<double>(to_us - from_us);
-}
-
 // Takes jumps out of positions at times in seconds.
 std::vector<double> take_jumps(std::vector<double>& position, const std::vector<double>& time_s) {
   // A jump changes the rate twice, there and back. Turning wheels, quantised by their encoder, change it by
@@ -148,21 +145,20 @@ std::vector<double> take_jumps(std::vector<double>& position, const std::vector<
   return jumps;
 }
 
-// Range of positions that leap through more than half of it, such as angles within a turn; 0 of others.
-double leap_of(const std::vector<signals::Sample>& samples, std::size_t number) {
-  double low = std::numeric_limits<double>::infinity(), high = -low, last = signals::unmeasured;
-  std::vector<double> steps;
-  for (const signals::Sample& sample : samples) {
-    const double position = *signals::numbers_of(sample)[number];
-    if (std::isnan(position)) continue;
-    if (!std::isnan(last)) steps.push_back(std::abs(position - last));
-    low = std::min(low, position);
-    high = std::max(high, position);
-    last = position;
-  }
+// The period of positions that leap back by more than half of their range, as angles do; 0 of others.
+double period_of(const std::vector<signals::Sample>& samples, std::size_t number) {
+  std::vector<double> steps, periods;
+  for (const signals::Sample& sample : samples)
+    if (const double position = *signals::numbers_of(sample)[number]; !std::isnan(position))
+      steps.push_back(position);
+  if (steps.empty()) return 0;
+  const auto [low, high] = std::ranges::minmax(steps);
+  std::adjacent_difference(steps.begin(), steps.end(), steps.begin());
+  // As far as the leap and the step before it, which go different ways.
+  for (std::size_t k = 2; k < steps.size(); ++k)
+    if (2 * std::abs(steps[k]) > high - low) periods.push_back(std::abs(steps[k] - steps[k - 1]));
   // Such leaps are few; a wheel that turns fast between rows steps by any amount.
-  const auto leaps = std::ranges::count_if(steps, [&](double step) { return 2 * step > high - low; });
-  return leaps > 0 && static_cast<std::size_t>(3 * leaps) < steps.size() ? high - low : 0;
+  return periods.empty() || 3 * periods.size() >= steps.size() ? 0 : upper_median(std::move(periods));
 }
 
 // Puts the rate of a number in its place, over a window. Two samples at least; where fewer than two are
@@ -174,29 +170,23 @@ std::vector<double> differentiate(std::vector<signals::Sample>& samples, std::si
   std::vector<double> position, time_s;
   for (const signals::Sample& sample : samples) {
     position.push_back(*signals::numbers_of(sample)[number]);
-    time_s.push_back(seconds(samples.front().utime_us, sample.utime_us));
+    time_s.push_back(1e-6 * static_cast<double>(sample.utime_us - samples.front().utime_us));
   }
   std::vector<double> thrown = take_jumps(position, time_s);
   std::size_t begin = 0, end = 0;
   for (std::size_t k = 0; k < samples.size(); ++k) {
-    const std::int64_t at = samples[k].utime_us;
-    while (seconds(samples[begin].utime_us, at) > window_s / 2) ++begin;
-    while (end < samples.size() && seconds(at, samples[end].utime_us) <= window_s / 2) ++end;
-    const auto sum = [&](const auto& value) {
-      // The neighbours at least.
-      const std::size_t first = std::min(begin, k == 0 ? 0 : k - 1);
-      const std::size_t behind = std::max(end, std::min(k + 2, samples.size()));
-      double total = 0;
-      for (std::size_t j = first; j < behind; ++j)
-        if (!std::isnan(position[j])) total += value(seconds(at, samples[j].utime_us), position[j]);
-      return total;
-    };
-    const double n = sum([](double, double) { return 1; });
-    const double t = sum([](double dt, double) { return dt; }) / n;
-    const double y = sum([](double, double p) { return p; }) / n;
-    const double tt = sum([&](double dt, double) { return (dt - t) * (dt - t); });
-    const double ty = sum([&](double dt, double p) { return (dt - t) * (p - y); });
-    *signals::numbers_of(samples[k])[number] = n >= 2 && tt > 0 ? ty / tt : signals::unmeasured;
+    while (time_s[k] - time_s[begin] > window_s / 2) ++begin;
+    while (end < samples.size() && time_s[end] - time_s[k] <= window_s / 2) ++end;
+    // The neighbours at least.
+    const std::size_t behind = std::max(end, std::min(k + 2, samples.size()));
+    double n = 0, t = 0, y = 0, tt = 0, ty = 0;
+    for (std::size_t j = std::min(begin, k == 0 ? 0 : k - 1); j < behind; ++j) {
+      if (std::isnan(position[j])) continue;
+      const double dt = time_s[j] - time_s[k];
+      n += 1, t += dt, y += position[j], tt += dt * dt, ty += dt * position[j];
+    }
+    const double spread = n * tt - t * t;
+    *signals::numbers_of(samples[k])[number] = spread > 0 ? (n * ty - t * y) / spread : signals::unmeasured;
   }
   return thrown;
 }
@@ -238,12 +228,13 @@ class Importer {
       TRY(take_row(row));
     }
     TRY(close_mission());
-    TRY(check_loss());
     // Rows behind the last mission, if any.
+    if (result_.empty()) result_.emplace_back();
     ImportReport &last = result_.back().report, &first = result_.front().report;
     last.rows += open_.report.rows;
     last.rows_unsorted += open_.report.rows_unsorted;
     last.rows_without_motion += open_.report.rows_without_motion;
+    TRY(check_loss());
     if (!repeats_ && !mapping_.rows_on_change && first.cells_filled > first.rows / 2)
       notes_.push_back(
           R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
@@ -393,12 +384,11 @@ class Importer {
       const auto restarts = restarts_of(run);
       std::int64_t newest_us = INT64_MIN;
       parts.push_back({parts_[part].mission});
-      for (std::size_t k = 0, next = 0; k < run.size(); ++k) {
-        if (next < restarts.size() && restarts[next] == k) {
+      for (std::size_t k = 0; k < run.size(); ++k) {
+        if (std::ranges::binary_search(restarts, k)) {
           const auto step_us = run[k].since_zero_us - run[k - 1].since_zero_us;
           parts.push_back({parts_[part].mission, 1e-6 * static_cast<double>(step_us)});
           newest_us = INT64_MIN;
-          ++next;
         }
         run[k].part = parts.size() - 1;
         run[k].early = run[k].since_zero_us < newest_us;
@@ -411,12 +401,12 @@ class Importer {
 
   Result<std::int64_t> time_of(const RowPlace& row) {
     const bool first = !shift_us_;
-    std::int64_t utime_us = 0;
-    if (first) shift_us_ = 0;
-    if ((first && options_.start_utime_us &&
-         __builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_)) ||
-        __builtin_add_overflow(row.since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
-        utime_us > latest_import_utime_us)
+    if (first)
+      shift_us_ = options_.start_utime_us
+                      ? std::min(*options_.start_utime_us, latest_import_utime_us + 1) - row.since_zero_us
+                      : 0;
+    const std::int64_t utime_us = row.since_zero_us + *shift_us_;
+    if (utime_us < 0 || utime_us > latest_import_utime_us)
       return table_.refuse(mapping_.layout.time_name(), std::to_string(row.since_zero_us) + " us",
                            "is not between the years 1970 and 2100");
     // Tables of one recording count from one zero.
@@ -435,10 +425,9 @@ class Importer {
 
   // The first leap of a column by nearly all of a counter's range.
   void note_overflow(Column& column, double value) {
-    constexpr double sixteen_bits = 65'536, thirty_two_bits = 4'294'967'296;
     constexpr double nearly = 0.75;
     const double leap = std::abs(value - column.value);
-    for (const double range : {sixteen_bits, thirty_two_bits})
+    for (const double range : {0x1p16, 0x1p32})
       if (leap > nearly * range && leap <= range && !std::exchange(column.overflows, true))
         notes_.push_back(fmt::format(
             R"(line {}: column '{}' jumps by {:.10g}; "wraps_at": {:.10g} corrects a counter that overflows)",
@@ -593,17 +582,12 @@ class Importer {
     return {};
   }
 
-  static bool lacks_motion(const signals::Sample& sample) {
-    return std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1]);
-  }
-
   // Angles of a wheel within one turn leap back by it; leaps of other positions are noted.
   void undo_turns(std::vector<signals::Sample>& samples, const ImportTarget& target) {
-    constexpr double turn_rad = 2 * std::numbers::pi, rounding = 0.01;
-    const double leap = leap_of(samples, target.number);
-    if (leap == 0) return;
-    const bool turns =
-        leap > turn_rad / 2 && leap <= turn_rad + rounding && target.name.starts_with("wheel_");
+    constexpr double turn_rad = 2 * std::numbers::pi, unsure = 0.05;  // by the change of the speed
+    const double period = period_of(samples, target.number);
+    if (period == 0) return;
+    const bool turns = std::abs(period / turn_rad - 1) < unsure && target.name.starts_with("wheel_");
     Unwrapped unwrapped;
     for (signals::Sample& sample : samples) {
       double& position = *signals::numbers_of(sample)[target.number];
@@ -612,7 +596,7 @@ class Importer {
     notes_.push_back(
         turns ? fmt::format("{}: positions jump back by a turn and are unwrapped", target.name)
               : fmt::format(R"({}: positions jump by {:.6g}; "wraps_at" corrects a counter that overflows)",
-                            target.name, leap));
+                            target.name, period));
   }
 
   // Computes rates, and drops samples left without motion.
@@ -641,14 +625,14 @@ class Importer {
 
   // A table in which most rows give no sample is rejected as a mistake.
   Result<void> check_loss() const {
-    ImportReport all = open_.report;
+    ImportReport all;
     for (const Import& one : result_) {
       all.rows += one.report.rows;
       all.rows_out_of_time += one.report.rows_out_of_time;
       all.rows_without_motion += one.report.rows_without_motion;
     }
     const std::size_t lost = all.rows_out_of_time + all.rows_without_motion;
-    if (!result_.empty() && 2 * lost <= all.rows) return {};
+    if (!result_[0].recording.samples.empty() && 2 * lost <= all.rows) return {};
     std::string without;
     for (const Column& column : columns_)
       if (std::isnan(column.value)) without += (without.empty() ? "; no number in '" : "', '") + column.name;

@@ -1,6 +1,7 @@
 #include "telemetry/datagram.h"
 
 #include <algorithm>
+#include <boost/endian/conversion.hpp>
 #include <cstring>
 #include <utility>
 
@@ -13,15 +14,6 @@ constexpr std::uint32_t short_magic = 0x4c433032;     // "LC02"
 constexpr std::uint32_t fragment_magic = 0x4c433033;  // "LC03"
 constexpr std::size_t short_header = 8, fragment_header = 20;
 constexpr std::size_t max_channel_length = 63;
-
-std::uint32_t read32(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
-  return static_cast<std::uint32_t>(bytes[at]) << 24 | static_cast<std::uint32_t>(bytes[at + 1]) << 16 |
-         static_cast<std::uint32_t>(bytes[at + 2]) << 8 | static_cast<std::uint32_t>(bytes[at + 3]);
-}
-
-std::uint16_t read16(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
-  return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
-}
 
 // Removes the channel's name from the front of `bytes` and returns it; empty if there is no name that LCM
 // allows.
@@ -65,7 +57,7 @@ std::optional<ChannelMessage> DatagramReader::take(const Sender& sender,
                                                    std::int64_t now_us) {
   counters_.received.fetch_add(1, std::memory_order_relaxed);
   if (datagram.size() < short_header) return refuse(DatagramFault::malformed);
-  const std::uint32_t magic = read32(datagram, 0);
+  const std::uint32_t magic = boost::endian::load_big_u32(&datagram[0]);
   if (magic == fragment_magic) return take_fragment(sender, datagram, now_us);
   if (magic != short_magic) return refuse(DatagramFault::malformed);
   std::span<const std::uint8_t> data = datagram.subspan(short_header);
@@ -78,12 +70,9 @@ std::optional<ChannelMessage> DatagramReader::take(const Sender& sender,
 std::optional<DatagramReader::Fragment> DatagramReader::parse_fragment(
     std::span<const std::uint8_t> datagram) {
   if (datagram.size() < fragment_header) return refuse(DatagramFault::malformed);
-  Fragment f{read32(datagram, 4),
-             read32(datagram, 8),
-             read32(datagram, 12),
-             read16(datagram, 16),
-             read16(datagram, 18),
-             {},
+  Fragment f{boost::endian::load_big_u32(&datagram[4]),  boost::endian::load_big_u32(&datagram[8]),
+             boost::endian::load_big_u32(&datagram[12]), boost::endian::load_big_u16(&datagram[16]),
+             boost::endian::load_big_u16(&datagram[18]), {},
              datagram.subspan(fragment_header)};
   if (f.size > max_message_bytes) return refuse(DatagramFault::too_large);
   if (f.number == 0) {

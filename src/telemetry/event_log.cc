@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/endian/conversion.hpp>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -18,21 +19,6 @@ namespace {
 
 constexpr std::array<std::uint8_t, 4> sync_bytes{0xED, 0xA1, 0xDA, 0x01};
 
-std::uint32_t read_u32(const std::uint8_t* at) noexcept {
-  return static_cast<std::uint32_t>(at[0]) << 24 | static_cast<std::uint32_t>(at[1]) << 16 |
-         static_cast<std::uint32_t>(at[2]) << 8 | at[3];
-}
-
-std::int64_t read_i64(const std::uint8_t* at) noexcept {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(read_u32(at)) << 32 | read_u32(at + 4));
-}
-
-template <class Unsigned>
-std::uint8_t* put(std::uint8_t* at, Unsigned value) noexcept {
-  for (std::size_t i = sizeof value; i-- > 0;) *at++ = static_cast<std::uint8_t>(value >> (8 * i));
-  return at;
-}
-
 struct Header {
   bool sync = false;
   std::int64_t number = 0;
@@ -41,11 +27,11 @@ struct Header {
   std::uint32_t data_length = 0;
 
   explicit Header(const std::uint8_t* at) noexcept
-      : sync(read_u32(at) == log_sync_word),
-        number(read_i64(at + 4)),
-        timestamp_us(read_i64(at + 12)),
-        channel_length(read_u32(at + 20)),
-        data_length(read_u32(at + 24)) {}
+      : sync(boost::endian::load_big_u32(at) == log_sync_word),
+        number(boost::endian::load_big_s64(at + 4)),
+        timestamp_us(boost::endian::load_big_s64(at + 12)),
+        channel_length(boost::endian::load_big_u32(at + 20)),
+        data_length(boost::endian::load_big_u32(at + 24)) {}
 
   // Negative lengths of the file are huge here and fail the same test.
   [[nodiscard]] bool plausible(const LogLimits& limits) const noexcept {
@@ -238,11 +224,11 @@ Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view c
   }
   if (!file_) return fail(Fault::unavailable, path_, "the log is closed");
   std::array<std::uint8_t, log_header_size> header{};
-  std::uint8_t* at = put(header.data(), log_sync_word);
-  at = put(at, static_cast<std::uint64_t>(count_));
-  at = put(at, static_cast<std::uint64_t>(timestamp_us));
-  at = put(at, static_cast<std::uint32_t>(channel.size()));
-  put(at, static_cast<std::uint32_t>(data.size()));
+  boost::endian::store_big_u32(&header[0], log_sync_word);
+  boost::endian::store_big_s64(&header[4], count_);
+  boost::endian::store_big_s64(&header[12], timestamp_us);
+  boost::endian::store_big_u32(&header[20], static_cast<std::uint32_t>(channel.size()));
+  boost::endian::store_big_u32(&header[24], static_cast<std::uint32_t>(data.size()));
   if (std::fwrite(header.data(), 1, header.size(), file_.get()) != header.size() ||
       std::fwrite(channel.data(), 1, channel.size(), file_.get()) != channel.size() ||
       (!data.empty() && std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size())) {

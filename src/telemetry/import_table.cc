@@ -10,6 +10,7 @@
 #include <boost/algorithm/string/replace.hpp>
 #include <charconv>
 #include <cmath>
+#include <set>
 #include <span>
 
 #include "base/try.h"
@@ -38,29 +39,21 @@ bool means_no_value(std::string_view text, const std::vector<std::string>& more)
 std::string_view element_of(std::string_view list, std::size_t index) {
   if (const std::size_t open = list.find('['); open != std::string_view::npos)
     list = list.substr(open, list.find_last_of(']') - open);
-  constexpr std::string_view between = ",;:| \t\n'\"[](){}";
-  for (std::size_t at = list.find_first_not_of(between); at != std::string_view::npos;) {
-    const std::size_t end = std::min(list.find_first_of(between, at), list.size());
-    if (index-- == 0) return list.substr(at, end - at);
-    at = list.find_first_not_of(between, end);
-  }
+  static const RE2 element(R"(([^,;:| \t\n'"\[\](){}]+))");
+  re2::StringPiece rest = list, found;
+  while (RE2::FindAndConsume(&rest, element, &found))
+    if (index-- == 0) return {found.data(), found.size()};
   return {};
 }
 
 // Of one column, in its unit.
 std::optional<std::int64_t> time_us(std::string_view text, std::int64_t unit_ns, double scale,
-                                    bool decimal_comma) {
-  std::int64_t whole = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), whole);
-  if (scale == 1 && fault == std::errc{} && end == text.data() + text.size()) {
-    // Exact: ns since 1970 do not fit a double.
-    if (unit_ns < 1000) return whole / (1000 / unit_ns);
-    std::int64_t scaled = 0;
-    const bool beyond = __builtin_mul_overflow(whole, unit_ns / 1000, &scaled);
-    return beyond || std::abs(scaled) > latest_import_utime_us ? std::nullopt : std::optional(scaled);
-  }
-  const double us = parse_number(text, decimal_comma).value_or(signals::unmeasured) * scale *
-                    static_cast<double>(unit_ns) / 1000;
+                                    std::optional<double> number) {
+  std::int64_t exact_ns = 0;  // ns since 1970 do not fit a double
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), exact_ns);
+  if (unit_ns == 1 && scale == 1 && fault == std::errc{} && end == text.data() + text.size())
+    return exact_ns / 1000;
+  const double us = number.value_or(signals::unmeasured) * scale * (static_cast<double>(unit_ns) / 1000);
   if (!(std::abs(us) <= static_cast<double>(latest_import_utime_us))) return std::nullopt;
   return std::llround(us);
 }
@@ -70,19 +63,22 @@ std::string_view without_unit(std::string_view cell) {
   return cell.substr(0, cell.find_last_of(decimal_digits) + 1);
 }
 
+const RE2& groups_of(char sign) {
+  static const RE2 of_points(R"([-+]?[1-9]\d{0,2}(\.\d{3})+)"), of_commas(R"([-+]?[1-9]\d{0,2}(,\d{3})+)");
+  return sign == '.' ? of_points : of_commas;
+}
+
 // Takes the signs between groups of three digits out and sets a decimal point; false where that is in doubt:
-// one group without a decimal sign may be a fraction.
-bool without_groups(std::string& number, bool decimal_comma) {
-  static const RE2 of_points(R"([-+]?\d{1,3}(\.\d{3})+)"), of_commas(R"([-+]?\d{1,3}(,\d{3})+)");
+// one group without a decimal sign may be a fraction unless the table is `grouped`.
+bool without_groups(std::string& number, bool decimal_comma, bool grouped) {
   boost::replace_all(number, "\u2212", "-");
   for (const char* sign : {"\u00a0", "\u202f", "'"}) boost::erase_all(number, sign);
   const char group = decimal_comma ? '.' : ',', decimal = decimal_comma ? ',' : '.';
   const std::size_t point = std::min(number.find(decimal), number.size());
   const auto end = number.begin() + static_cast<std::ptrdiff_t>(point);
   if (const auto groups = std::count(number.begin(), end, group); groups > 0) {
-    if (groups == 1 && end == number.end()) return false;
-    if (!RE2::FullMatch(std::string_view(number).substr(0, point), decimal_comma ? of_points : of_commas))
-      return false;
+    if (groups == 1 && end == number.end() && !grouped) return false;
+    if (!RE2::FullMatch(std::string_view(number).substr(0, point), groups_of(group))) return false;
     number.erase(std::remove(number.begin(), end, group), end);
   }
   std::ranges::replace(number, decimal, '.');
@@ -91,10 +87,10 @@ bool without_groups(std::string& number, bool decimal_comma) {
 
 }  // namespace
 
-std::optional<double> parse_number(std::string_view text, bool decimal_comma) {
+std::optional<double> parse_number(std::string_view text, bool decimal_comma, bool grouped) {
   std::string plain;
   if (decimal_comma || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos) {
-    if (!without_groups(plain = text, decimal_comma)) return std::nullopt;
+    if (!without_groups(plain = text, decimal_comma, grouped)) return std::nullopt;
     text = plain;
   }
   if (text.starts_with('+')) text.remove_prefix(1);
@@ -127,18 +123,32 @@ Result<ImportTable> ImportTable::open(std::string_view text, const TableLayout& 
   return opened;
 }
 
+// A sign is between groups if no number has it as a decimal sign, and a column with it has integers below
+// 1000.
 void ImportTable::detect_decimal() {
-  constexpr int probed = 200;  // rows
+  constexpr int probed = 200;                      // rows
+  std::map<char, std::size_t> numbers, fractions;  // by sign
+  std::map<char, std::set<std::size_t>> grouped;
+  std::set<std::size_t> small;
   CsvTable rows = *this;
-  int commas = 0;  // more than points
   for (int k = 0; k < probed && rows.next(row_).value_or(false); ++k)
-    for (const std::string_view whole : row_) {
-      const std::string_view cell = without_unit(trimmed(whole));
-      const bool comma = cell.find(',') != std::string_view::npos;
-      const bool point = !comma && cell.find('.') != std::string_view::npos;
-      if ((comma || point) && parse_number(cell, comma)) commas += comma ? 1 : -1;
+    for (std::size_t column = 0; column < row_.size(); ++column) {
+      const std::string_view cell = without_unit(trimmed(row_[column]));
+      if (cell.empty()) continue;
+      const std::size_t at = cell.find_last_of(",.");
+      const char sign = at == std::string_view::npos ? '\0' : cell[at];
+      if (cell.size() < 4 && sign == '\0') small.insert(column);
+      if (sign == '\0' || !parse_number(cell, sign == ',', true)) continue;
+      ++numbers[sign];
+      if (RE2::FullMatch(cell, groups_of(sign)))
+        grouped[sign].insert(column);
+      else
+        ++fractions[sign];
     }
-  decimal_comma_ = commas > 0;
+  decimal_comma_ = numbers[','] > numbers['.'];
+  const char sign = decimal_comma_ ? ',' : '.';
+  grouped_ = fractions[sign] == 0 && std::ranges::find_first_of(grouped[sign], small) != grouped[sign].end();
+  decimal_comma_ = decimal_comma_ != grouped_;
 }
 
 Result<CellPlace> ImportTable::find(const std::string& column) const {
@@ -246,13 +256,13 @@ std::string_view ImportTable::text(CellPlace place) const {
 Result<std::optional<double>> ImportTable::number(CellPlace place, const std::string& column) {
   const std::string_view cell = text(place);
   if (cell.empty()) return std::optional<double>();
-  auto value = parse_number(cell, decimal_comma_);
+  auto value = parse_number(cell, decimal_comma_, grouped_);
   if ((!value || std::isnan(*value) || !layout_.no_value.empty()) && means_no_value(cell, layout_.no_value))
     return std::optional(signals::unmeasured);
   // The unit behind the number, the same on every row.
   const std::string_view number = value ? cell : without_unit(cell);
   const std::string_view unit = trimmed(cell.substr(number.size()));
-  if (!value) value = parse_number(number, decimal_comma_);
+  if (!value) value = parse_number(number, decimal_comma_, grouped_);
   if (!value) return refuse(column, cell, R"(is no number; "no_value" lists words for no value)");
   const auto [known, first] = units_.try_emplace(place.column, unit);
   if (known->second != unit)
@@ -276,10 +286,11 @@ Result<std::int64_t> ImportTable::time() {
   }
   for (std::size_t k = 0; k < time_places_.size(); ++k) {
     const std::string_view cell = text(time_places_[k]);
-    const auto part = time_us(cell, layout_.time_unit_ns, layout_.time_columns[k].scale, decimal_comma_);
-    if (!part && parse_number(cell, decimal_comma_))
-      return refuse(column, cell, "is no time until the year 2100: the unit is smaller");
-    if (!part || __builtin_add_overflow(sum_us, *part, &sum_us)) return refuse(column, cell, "is no time");
+    const auto number = parse_number(cell, decimal_comma_, grouped_);
+    const auto part = time_us(cell, layout_.time_unit_ns, layout_.time_columns[k].scale, number);
+    if (!part && number) return refuse(column, cell, "is no time until the year 2100: the unit is smaller");
+    if (!part) return refuse(column, cell, "is no time");
+    sum_us += *part;
   }
   if (layout_.wraps_at == 0) return sum_us;
   const double unit_us = static_cast<double>(layout_.time_unit_ns) / 1000;
@@ -297,11 +308,11 @@ std::vector<std::string> ImportTable::notes() const {
   if (!encoding().empty()) notes.push_back("the text is in " + encoding());
   if (format().skip_lines > layout_.format.skip_lines)
     notes.push_back(fmt::format("{} lines before the header are left out", format().skip_lines));
-  if (decimal_comma_ || (layout_.format.separator == '\0' && format().separator != ','))
-    notes.push_back(
-        fmt::format("the separator is {}, the decimal sign '{}'",
-                    format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
-                    decimal_comma_ ? ',' : '.'));
+  if (decimal_comma_ || grouped_ || (layout_.format.separator == '\0' && format().separator != ','))
+    notes.push_back(fmt::format(
+        "the separator is {}, the decimal sign '{}'{}",
+        format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
+        decimal_comma_ ? ',' : '.', grouped_ ? ", the other between groups of three digits" : ""));
   if (timeless_ > 0)
     notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,
                                 first_timeless_->field));

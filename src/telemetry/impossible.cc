@@ -17,18 +17,16 @@ constexpr std::size_t frozen_runs = 3, fewest_runs = 20;
 constexpr std::int64_t least_frozen_us = 1'000'000;
 constexpr double least_varied = 0.25;
 
-// The end of a counter of 16 or 32 bits in a decimal unit, or whole nines, by which devices and loggers state
-// that there is no reading: 655.35, -32.768, -999. 99.9 is an amperage of real recordings.
-bool means_no_reading(double value) {
-  constexpr double least = 32.76, rounding = 1e-6;
-  if (!(std::abs(value) > least)) return false;
-  for (const double nines : {999.0, 9999.0, 99'999.0})
-    if (std::abs(value) == nines) return true;
-  for (const double units : {1.0, 10.0, 100.0, 1000.0})
-    for (const double end : {32'767.0, 32'768.0, 65'535.0, 2'147'483'647.0, 4'294'967'295.0})
-      if (std::abs(std::abs(value) * units / end - 1) < rounding) return true;
-  return false;
-}
+// The stream is frozen if every reading repeats for as long while the robot moves. Motion explains that in
+// simulations without noise: a reading has to turn back in this share of the rows, as noise does in two of
+// three.
+constexpr double noisy_share = 0.5;
+
+// A reading beyond the robot file and more than this many times all before is none, however often it
+// comes. As large ones that vary this often are a signal: in another unit, or of another robot.
+// One that is this many times all others is none from its exact return on.
+constexpr double outlying = 4, returning = 2;
+constexpr int fewest_values = 3;
 
 }  // namespace
 
@@ -36,33 +34,100 @@ ImpossibleReadings::ImpossibleReadings(const robot::RobotModel& robot)
     : nominal_v_(robot.battery.nominal_voltage_v),
       speed_share_s_(robot.kinematics.wheel_radius_m / robot.limits.speed_m_s),
       turn_share_s_(robot.kinematics.wheel_radius_m /
-                    (2 * robot.kinematics.half_track_m * robot.limits.yaw_rate_rad_s)) {}
+                    (2 * robot.kinematics.half_track_m * robot.limits.yaw_rate_rad_s)),
+      current_a_(robot.limits.current_a),
+      yaw_rate_rad_s_(outlying * robot.limits.yaw_rate_rad_s) {
+  row_.fill(signals::unmeasured);
+}
+
+bool ImpossibleReadings::Run::is_long() const {
+  return runs >= fewest_runs && rows > frozen_runs * usual_rows;
+}
+
+void ImpossibleReadings::Run::begin(std::int64_t utime_us, bool counts, bool was_frozen) {
+  if (rows > 0 && !was_frozen) {
+    ++runs;
+    usual_rows = std::max(usual_rows, rows);
+  }
+  begin_us = utime_us;
+  rows = counts ? 1 : 0;
+}
+
+bool ImpossibleReadings::outlies(Channel& channel, double value, double limit) {
+  const double size = std::fabs(value), ratio = value / channel.outlier;
+  const double bound = channel.largest > 0 ? std::max(limit, outlying * channel.largest) : outlying * limit;
+  const double near = std::max(limit, returning * channel.largest);
+  if (size > near && size <= bound) {
+    if (ratio == 1) return value != channel.value;
+    const bool first = !(std::fabs(channel.outlier) > near);
+    channel.outlier = value;
+    if (first) return false;
+  }
+  if (!(size > bound)) {
+    channel.largest = std::fmax(channel.largest, size);
+    channel.outliers = 0;
+    return false;
+  }
+  if (!(ratio < outlying && ratio * outlying > 1)) channel.outliers = 0;
+  if (channel.outliers == 0 || ratio != 1) ++channel.outliers;
+  channel.outlier = value;
+  if (channel.outliers < fewest_values) return true;
+  channel.largest = size;
+  return false;
+}
 
 // `counts`: the row shows whether the channel follows the motion.
-bool ImpossibleReadings::frozen(Run& run, double value, double motion, std::int64_t utime_us,
-                                bool counts) const {
+bool ImpossibleReadings::frozen(Channel& channel, double value, double motion, std::int64_t utime_us,
+                                bool counts) {
+  Run& run = channel.run;
   counts = counts || (value == 0 && std::fabs(motion) > least_varied);
-  const bool beyond = run.runs >= fewest_runs && run.rows > frozen_runs * run.usual_rows;
-  if (value != run.value) {
-    const bool was_frozen = beyond && run.fastest - run.slowest > least_varied;
-    if (run.rows > 0 && !was_frozen) {
-      ++run.runs;
-      run.usual_rows = std::max(run.usual_rows, run.rows);
-    }
-    run.value = value;
-    run.begin_us = utime_us;
-    run.rows = counts ? 1 : 0;
-    run.slowest = run.fastest = value == 0 ? 0 : motion;  // 0 is read at rest
+  const auto is_frozen = [&] { return run.is_long() && channel.fastest - channel.slowest > least_varied; };
+  if (value != channel.value) {
+    run.begin(utime_us, counts, is_frozen());
+    channel.value = value;
+    channel.slowest = channel.fastest = value == 0 ? 0 : motion;  // 0 is read at rest
     return false;
   }
   run.rows += counts ? 1 : 0;
-  run.slowest = std::min(run.slowest, motion);
-  run.fastest = std::max(run.fastest, motion);
-  return beyond && run.fastest - run.slowest > least_varied && utime_us - run.begin_us >= least_frozen_us;
+  channel.slowest = std::min(channel.slowest, motion);
+  channel.fastest = std::max(channel.fastest, motion);
+  return is_frozen() && utime_us - run.begin_us >= least_frozen_us;
+}
+
+bool ImpossibleReadings::frozen(const signals::Sample& sample, bool moves) {
+  bool repeats = true, turns_back = false;
+  for (std::size_t k = 0; const double* reading : signals::numbers_of(sample)) {
+    double &last = row_[k], &last_step = steps_[k++];
+    const double step = *reading - last;
+    if (step == 0 || (std::isnan(*reading) && std::isnan(last))) continue;
+    repeats = false;
+    turns_back = turns_back || step * last_step < 0;
+    last_step = step;
+    last = *reading;
+  }
+  const auto is_frozen = [&] {
+    return rows_.is_long() &&
+           static_cast<double>(noisy_rows_) > noisy_share * static_cast<double>(rows_.runs);
+  };
+  if (!repeats) {
+    rows_.begin(sample.utime_us, moves, is_frozen());
+    noisy_rows_ += moves && turns_back ? 1 : 0;
+    return false;
+  }
+  rows_.rows += moves ? 1 : 0;
+  return is_frozen() && sample.utime_us - rows_.begin_us >= least_frozen_us;
 }
 
 std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sample& sample) {
   std::optional<Dropped> first;
+  const auto [right, left] = sample.wheel_velocity_rad_s;
+  if (frozen(sample, right != 0 || left != 0)) {
+    for (double* reading : signals::numbers_of(sample)) *reading = signals::unmeasured;
+    return Dropped{"wheel_velocity",
+                   fmt::format("every reading repeats while the robot moves: the stream is frozen; before, "
+                               "rows repeated {} times at most",
+                               rows_.usual_rows)};
+  }
   const double voltage_v = sample.battery_voltage_v;
   const double least_v = least_voltage_share * nominal_v_, greatest_v = greatest_voltage_share * nominal_v_;
   if (!std::isnan(voltage_v) && !(voltage_v >= least_v && voltage_v <= greatest_v)) {
@@ -71,37 +136,38 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
              fmt::format("battery_voltage is {:.4g} V; a pack of {:.4g} V nominal has {:.3g} to {:.3g} V",
                          voltage_v, nominal_v_, least_v, greatest_v)};
   }
-  const auto [right, left] = sample.wheel_velocity_rad_s;
   if (std::isnan(right + left)) return first;
   const bool counts = sample.wheel_velocity_rad_s != wheels_rad_s_;
   wheels_rad_s_ = sample.wheel_velocity_rad_s;
-  struct Channel {
+  struct Follower {
     const char* name;
     double* reading;
-    double motion;
+    double limit, motion;
   };
-  const std::array<Channel, 6> channels{
-      {{"battery_current", &sample.battery_current_a,
+  const std::array<Follower, 6> followers{
+      {{"battery_current", &sample.battery_current_a, current_a_,
         0.5 * speed_share_s_ * (std::fabs(right) + std::fabs(left))},
-       {"motor_voltage.right", sample.motor_voltage_v.data(), speed_share_s_ * right},
-       {"motor_voltage.left", &sample.motor_voltage_v[1], speed_share_s_ * left},
-       {"motor_current.right", sample.motor_current_a.data(), speed_share_s_ * right},
-       {"motor_current.left", &sample.motor_current_a[1], speed_share_s_ * left},
-       {"yaw_rate", &sample.yaw_rate_rad_s, turn_share_s_ * (right - left)}}};
-  for (std::size_t k = 0; k < channels.size(); ++k) {
-    const Channel& c = channels[k];
-    if (means_no_reading(*c.reading)) {
-      if (!first)
-        first = {c.name, fmt::format("{} is {:.10g}, by which devices state that they have no reading",
-                                     c.name, *c.reading)};
-      *c.reading = signals::unmeasured;
-    }
-    if (std::isnan(*c.reading) || !frozen(runs_[k], *c.reading, c.motion, sample.utime_us, counts)) continue;
-    if (!first)
-      first = {c.name, fmt::format("{} is frozen at {:.4g} while the robot moves; before, it repeated a "
-                                   "value for {} rows at most",
-                                   c.name, *c.reading, runs_[k].usual_rows)};
-    *c.reading = signals::unmeasured;
+       {"motor_voltage.right", sample.motor_voltage_v.data(), greatest_v, speed_share_s_ * right},
+       {"motor_voltage.left", &sample.motor_voltage_v[1], greatest_v, speed_share_s_ * left},
+       {"motor_current.right", sample.motor_current_a.data(), current_a_, speed_share_s_ * right},
+       {"motor_current.left", &sample.motor_current_a[1], current_a_, speed_share_s_ * left},
+       {"yaw_rate", &sample.yaw_rate_rad_s, yaw_rate_rad_s_, turn_share_s_ * (right - left)}}};
+  for (std::size_t k = 0; k < followers.size(); ++k) {
+    const Follower& f = followers[k];
+    Channel& channel = channels_[k];
+    if (std::isnan(*f.reading)) continue;
+    std::string why;
+    if (outlies(channel, *f.reading, f.limit))
+      why = fmt::format(
+          "{} is {:.10g}, where all before were within {:.4g} and the robot file gives {:.4g} at most",
+          f.name, *f.reading, channel.largest, f.limit);
+    else if (frozen(channel, *f.reading, f.motion, sample.utime_us, counts))
+      why = fmt::format(
+          "{} is frozen at {:.4g} while the robot moves; before, it repeated a value for {} rows at most",
+          f.name, *f.reading, channel.run.usual_rows);
+    if (why.empty()) continue;
+    if (!first) first = {f.name, std::move(why)};
+    *f.reading = signals::unmeasured;
   }
   return first;
 }
@@ -110,7 +176,7 @@ std::vector<DroppedReadings> drop_impossible(std::vector<Recording>& recordings,
                                              const robot::RobotModel& robot) {
   std::vector<DroppedReadings> all;
   ImpossibleReadings impossible(robot);
-  for (Recording& recording : recordings)
+  for (Recording& recording : recordings) {
     for (signals::Sample& sample : recording.samples) {
       auto dropped = impossible.drop(sample);
       if (!dropped) continue;
@@ -119,6 +185,8 @@ std::vector<DroppedReadings> drop_impossible(std::vector<Recording>& recordings,
         at = all.insert(all.end(), {std::move(dropped->channel), std::move(dropped->why), 0});
       ++at->samples;
     }
+    std::erase_if(recording.samples, lacks_motion);
+  }
   return all;
 }
 

@@ -735,6 +735,22 @@ TEST_F(PipelineTest, ImpossibleReadingsAreNotMeasured) {
   }
 }
 
+// From 4 s to 8 s the last row repeats; its first second is booked.
+TEST_F(PipelineTest, FrozenStreamIsNotBooked) {
+  PipelineHarness one;
+  one.add_robot(testing::nomad());
+  for (std::int64_t k = 0; k <= 500; ++k) {
+    Sample s = sample(k);
+    s.battery_current_a += 0.01 * static_cast<double>(k < 200 || k >= 400 ? k % 2 : 1);
+    one.pipeline->handle({"nomad", s, s.utime_us});
+  }
+  one.pipeline->finish();
+  const auto missions = one.missions();
+  ASSERT_EQ(missions.size(), 1u);
+  EXPECT_NEAR(missions[0].accounts.measured_s, 7, 0.1);
+  EXPECT_NEAR(static_cast<double>(missions[0].sample_faults.at("impossible")), 150, 3);
+}
+
 TEST_F(PipelineTest, ChargeBeginsWithPossibleReading) {
   robot::RobotModel robot = testing::nomad();
   robot.robot_id = "plain";

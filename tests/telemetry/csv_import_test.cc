@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -665,6 +666,16 @@ TEST(ImportLayout, NumbersInManyForms) {
   EXPECT_DOUBLE_EQ(voltage("\u221226.5"), -26.5);
   for (const char* cell : {"1,23,456.5", "1234,567.5", "26.5.1", "2 6", "5 of 10"})
     EXPECT_EQ(voltage(cell), -1) << cell;
+  const auto last_of = [](const std::string& table) {
+    return (*read_table(table, in_seconds))[0].recording.samples[1];
+  };
+  for (const char* table :
+       {"t,r,l,v\n0,834,1,\"26,372\"\n1,\"1,834\",1,\"26,372\"\n",
+        "t;r;l;v\n0;834;1;26.372\n1;1.834;1;26.372\n", "t;r;l;v\n0;834;1;26,372\n1;1,834;1;26,372\n"}) {
+    EXPECT_EQ(last_of(table).wheel_velocity_rad_s[0], 1834) << table;
+    EXPECT_EQ(last_of(table).battery_voltage_v, 26372) << table;
+  }
+  EXPECT_EQ(last_of("t;r;l;v\n0;834;1;26,372\n1;0,834;1;26,372\n").battery_voltage_v, 26.372);
   const auto units = read_table("t,r,l,v\n0,1,1,26 V\n1,1,1,26 V\n2,1,1,26000 mV\n3,1,1,26 V\n", in_seconds);
   EXPECT_THAT(units.error().message, HasSubstr("has the unit 'mV', the rows before 'V'"));
 }
@@ -853,6 +864,20 @@ TEST(ImportSamples, TurnsOfWheelsAreUndone) {
     EXPECT_THAT(
         read->report.notes,
         ::testing::ElementsAre(::testing::HasSubstr("wheel_velocity[0]: positions jump back by a turn")));
+  }
+}
+
+TEST(ImportSamples, OtherPeriodsAreNotTurns) {
+  for (const double period : {3.6, 4.2, 5.5, 7.0}) {
+    std::string csv = "t,r,l\n";
+    for (int k = 0; k < 60; ++k)
+      csv += std::to_string(0.1 * k) + "," + std::to_string(std::fmod(0.7 * k, period)) + "," +
+             std::to_string(k) + "\n";
+    const auto read =
+        missions_of(csv, R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r", "rate": {}}, {"column": "l"}]}})");
+    EXPECT_THAT(read[0].report.notes,
+                ::testing::Contains(HasSubstr(fmt::format("positions jump by {}", period))));
   }
 }
 
