@@ -132,7 +132,6 @@ Result<bool> ProposalReview::review(history::Proposal candidate) {
   }
   detail["back_test"] = Json::parse(tested.back_test_json);
   candidate.detail_json = detail.dump();
-  untested_.erase(candidate.robot_id);
   const history::Outcome id = writer_.execute(history::AddProposal{std::move(candidate)});
   if (!id) return tl::unexpected(id.error());
   if (!options_.automatic) return true;
@@ -149,10 +148,6 @@ Result<void> ProposalReview::review_open(const std::string& robot_id) {
   if (!marks.empty() && marks.back().utime_us > detail.value("fitted_until_utime_us", std::int64_t{0}))
     return dismiss(*open, "the robot changed on " + utc_text(marks.back().utime_us).substr(0, 10) +
                               ", after the missions that it was fitted on");
-  // Again with a quarter more missions.
-  const auto tested_on = detail.value(Json::json_pointer("/back_test/missions"), Json::array()).size();
-  if (4 * ++untested_[robot_id] < tested_on) return {};
-  untested_.erase(robot_id);
   TRY_ASSIGN(AdoptionRequest request, test_of(*open, detail));
   const Result<Adoption> tested = adoption_.adopt(request);
   if (!tested && tested.error().fault == Fault::conflict) return {};  // another version is in force

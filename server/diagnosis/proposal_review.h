@@ -58,7 +58,6 @@ class ProposalReview {
   const DriftView& drift_;
   std::function<std::int64_t()> now_utime_us_;
   ReviewOptions options_;
-  std::map<std::string, std::size_t> untested_;  // missions since the open proposal was tested, by robot
   std::mutex mutex_;
   std::condition_variable wake_;
   std::map<std::string, history::Proposal> suggested_;  // by robot: the newest counts

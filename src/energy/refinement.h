@@ -43,10 +43,12 @@ struct RefinementTrust {
   // averages it out.
   double inertia_scale = 0.02;
   // Payload.
-  double payload_wide = 1.5;     // of the payload limit: possible undeclared load
-  double payload_least = 0.05;   // of the payload limit: less is not worth an event
-  double payload_scale = 0.02;   // of all that is carried: error of the torque constant, load-borne friction
-  double payload_certain = 3.3;  // deviations from which a payload is undeclared: by chance 1 mission in 1000
+  double payload_wide = 1.5;    // of the payload limit: possible undeclared load
+  double payload_least = 0.05;  // of the payload limit: less is not worth an event
+  double payload_scale = 0.02;  // of all that is carried: error of the torque constant, load-borne friction
+  // Deviations from which a payload is undeclared. 3.3 reported 3 of 320 missions of small robots without a
+  // load at 10 Hz, one or two a day of a fleet; 5 report none of these and find 80 of 81 loads of the tests.
+  double payload_certain = 5;
 };
 
 struct Estimate {

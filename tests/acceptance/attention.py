@@ -78,6 +78,10 @@ def main():
         ratio = programs.metric('joulecast_robot_energy_ratio{robot_id="worn"}')
         check(ratio > 0.9, f"the ratio of a robot is a metric from the start: {ratio}")
         check("2023-11-16" in drift["message"] and "more energy" in drift["message"], f"the drift: {drift}")
+        known = ask(programs.url, "POST", "/v1/robots/worn/autonomy", {})[1]["drift"]
+        logged, = (e["detail"] for e in programs.get("/v1/event-log?robot_id=worn&limit=1000")["events"] if e["kind"] == "gap_drift")
+        check(logged["utime_us"] == known["start_utime_us"] and abs(logged["ratio_after"] - known["ratio_after"]) < 1e-8,
+              f"one change, of one date and size, in the log and in the autonomy: {logged} {known}")
         check("coulomb friction" in wait_for("worn", "gap_diagnosed", 120)["message"], "the cause of the drift")
 
         wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "a mission of the robot that will be silenced")

@@ -18,6 +18,7 @@ const suffixes = [
   ['_rad_s', 'rad/s'],
   ['_m_s', 'm/s'],
   ['_kg', 'kg'],
+  ['_nm', 'N m'],
   ['_rad', 'rad'],
   ['_s', 's'],
   ['_m', 'm'],
@@ -46,7 +47,7 @@ function strength(effect, name, { value, sd, unit }) {
 function strengths({ id, parameters: all }) {
   const place = all.x_m && all.y_m;
   const lines = Object.entries(all)
-    .filter(([name]) => !place || (name !== 'x_m' && name !== 'y_m'))
+    .filter(([name, p]) => (p.value !== 0 || p.sd > 0) && !(place && ['x_m', 'y_m'].includes(name)))
     .map(([name, p]) => [name === 'ratio' ? 'by' : format.words(unitOf(name)[0]), strength(id, name, p)]);
   if (place) lines.push(['centre', `(${format.digits(all.x_m.value)}, ${format.digits(all.y_m.value)}) m`]);
   return lines.map(([name, text]) => (
@@ -60,7 +61,7 @@ function strengths({ id, parameters: all }) {
 function region(w) {
   const [plain, unit] = unitOf(w.variable);
   const name = format.words(plain);
-  if (typeof w.from === 'string') return [name, w.from];
+  if (typeof w.from === 'string') return [name, unit ? `${w.from.replaceAll('-', '−')} ${unit}` : w.from];
   if (!unit.startsWith('rad')) return [name, `${format.range(w.from, w.to)} ${unit}`];
   return [name, `${format.range(format.degrees(w.from), format.degrees(w.to))} °${unit.slice(3)}`];
 }
@@ -120,7 +121,7 @@ const effectColumns = [
       <>
         {effectName(e.id)}
         {e.workshop && <span class="note check">check: {e.workshop}</span>}
-        {e.power_w > 0 && <span class="note check">moves {format.text(format.power(e.power_w))}</span>}
+        {e.power_w > 0 && <span class="note check">{format.text(format.power(e.power_w))} on average</span>}
         {e.calibrates && <span class="note check">corrects {e.calibrates} of the robot file</span>}
         {e.varies >= 0.01 && (
           <span class="note check">varies by {share(e.varies, 0)} along the missions</span>
