@@ -30,7 +30,7 @@ TEST(Calibrate, RecoversTheSimulatedBattery) {
   // The slow test ends at the cut-off, a little before the true charge is gone.
   EXPECT_NEAR(found.capacity_ah * *found.ageing_factor, 2.25, 0.01 * 2.25);
   EXPECT_EQ(found.capacity_ah, 2.5);
-  // The ohmic share is not separable from a fast branch; what a steady current meets is.
+  // The ohmic share is not separable from a fast branch; the resistance to a steady current is.
   const auto steady_ohm = [](const robot::Battery& battery) {
     double sum = battery.internal_resistance_ohm;
     for (const auto& branch : battery.branches) sum += branch.resistance_ohm;

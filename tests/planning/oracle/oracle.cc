@@ -14,7 +14,7 @@ namespace {
 
 constexpr double unlimited = 1e19;  // IPOPT's infinity
 constexpr double soft_nm =
-    2e-2;  // torque below which a gear's loss is smoothed; with 1e-3 it seldom converges
+    2e-2;  // torque below which a gear's loss is smoothed; with 1e-3 it rarely converges
 
 // Gauss-Legendre's three points of [0, 1] and their weights.
 constexpr double gauss_at[] = {0.11270166537925831, 0.5, 0.8872983346207417};
