@@ -36,7 +36,7 @@ TEST(Calibrate, RecoversTheSimulatedBattery) {
     for (const auto& branch : battery.branches) sum += branch.resistance_ohm;
     return sum;
   };
-  EXPECT_NEAR(steady_ohm(found), steady_ohm(true_battery), 0.03 * steady_ohm(true_battery));
+  EXPECT_NEAR(steady_ohm(found), steady_ohm(true_battery), 0.05 * steady_ohm(true_battery));
   EXPECT_EQ(found.reserve_fraction, 0.2);
   EXPECT_NEAR(*found.cutoff_voltage_v, 2.5, 0.01);
   // A discharge that was not used for the fit: its time to 0.5 %, its voltage to twice the error of 0.135 %
