@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "base/try.h"
 #include "planning/gauss.h"
 #include "planning/root.h"
 #include "planning/run_planner.h"
@@ -82,10 +83,10 @@ class Request {
                     "is " + std::to_string(run.payload_kg) + ", this robot carries at most " +
                         std::to_string(robot.limits.payload_kg));
       }
-      auto planner = RunPlanner::make(robot, loads, run, problem, k == 0 ? problem.start_speed_m_s : 0,
-                                      k + 1 == path.runs.size() ? problem.end_speed_m_s : 0);
-      if (!planner) return tl::unexpected(std::move(planner.error()));
-      request.runs_.push_back(std::move(*planner));
+      TRY_ASSIGN(auto planner,
+                 RunPlanner::make(robot, loads, run, problem, k == 0 ? problem.start_speed_m_s : 0,
+                                  k + 1 == path.runs.size() ? problem.end_speed_m_s : 0));
+      request.runs_.push_back(std::move(planner));
       if ((nodes += request.runs_.back().nodes()) > most_nodes) return too_long();
     }
     request.dwell_s_ = path.dwell_s();
@@ -100,12 +101,11 @@ class Request {
     answers_.reserve(runs_.size());
     std::size_t nodes = 0;
     for (RunPlanner& run : runs_) {
-      auto answer = run.solve(price_w, stop_);
-      if (!answer) return tl::unexpected(std::move(answer.error()));
-      iterations_ += answer->iterations;
+      TRY_ASSIGN(RunAnswer answer, run.solve(price_w, stop_));
+      iterations_ += answer.iterations;
       if ((nodes += run.nodes()) > most_nodes) return too_long();
-      if (brief() && run.uniform()) answer->forget_motion();
-      answers_.push_back(std::move(*answer));
+      if (brief() && run.uniform()) answer.forget_motion();
+      answers_.push_back(std::move(answer));
     }
     return {};
   }
@@ -193,17 +193,16 @@ class Request {
                       std::max(smallest_j, keeps_until_j_ - least_energy_j));
     };
     if (std::ranges::any_of(runs_, [](const RunPlanner& run) { return run.on_grid(); })) {
-      const auto rough = least_j > 0 ? roughly(0) : PlanCost{};
-      if (!rough) return tl::unexpected(rough.error());
+      TRY_ASSIGN(const PlanCost rough, least_j > 0 ? roughly(0) : PlanCost{});
       const auto roughly_above = [&](double x) {
         return roughly(std::exp(-x)).map([&](const PlanCost& c) {
-          return above(c.energy_j, rough->energy_j);
+          return above(c.energy_j, rough.energy_j);
         });
       };
       if (auto ok = draw_in(at, 0.02, roughly_above); !ok) return ok;
     }
     const auto truly_above = [&](double x) -> Result<double> {
-      if (auto ok = solve(std::exp(-x)); !ok) return tl::unexpected(std::move(ok.error()));
+      TRY(solve(std::exp(-x)));
       return above(energy_j(), least_j);
     };
     const double rest = std::clamp(1e-5 * budget_j / std::max(spare_j, smallest_j), 1e-3, 0.5);
@@ -244,7 +243,7 @@ class Request {
       return roughly(price_at(x)).map([&](const PlanCost& cost) { return late(cost.duration_s); });
     };
     const auto truly_late = [&](double x) -> Result<double> {
-      if (auto ok = solve(price_at(x)); !ok) return tl::unexpected(std::move(ok.error()));
+      TRY(solve(price_at(x)));
       bound_by(deadline);
       return late(duration_s());
     };
@@ -280,9 +279,8 @@ class Request {
     double slow = -std::numeric_limits<double>::infinity(), fast = -slow, wide = fast;
     double stride = 1, last_x = 0, last_y = 0;
     for (int k = 0; k < 60 && fast - slow > 1e-9; ++k) {
-      const auto found = late(at.x);
-      if (!found) return tl::unexpected(found.error());
-      const double x = at.x, y = *found;
+      const double x = at.x;
+      TRY_ASSIGN(const double y, late(x));
       if (y <= 0 && y > -early) break;
       (y > 0 ? slow : fast) = x;
       if (x == (y > 0 ? at.most : at.least)) break;
@@ -303,11 +301,10 @@ class Request {
     PlanCost cost{dwell_s_ * loads_.electric().idle_w, dwell_s_};
     std::size_t nodes = 0;
     for (RunPlanner& run : runs_) {
-      auto answer = run.solve_roughly(price_w, stop_);
-      if (!answer) return tl::unexpected(std::move(answer.error()));
-      iterations_ += answer->iterations;
+      TRY_ASSIGN(const RunAnswer answer, run.solve_roughly(price_w, stop_));
+      iterations_ += answer.iterations;
       if ((nodes += run.nodes()) > most_nodes) return too_long();
-      cost.energy_j += answer->energy_j, cost.duration_s += answer->duration_s;
+      cost.energy_j += answer.energy_j, cost.duration_s += answer.duration_s;
     }
     return cost;
   }
@@ -545,9 +542,7 @@ Result<Plan> Request::written() {
     const Run& run = planner.run();
     RunAnswer& answer = answers_[k];
     if (!answer.has_motion()) {
-      auto again = runs_[k].solve(price_w_, stop_);
-      if (!again) return tl::unexpected(std::move(again.error()));
-      answer = std::move(*again);
+      TRY_ASSIGN(answer, runs_[k].solve(price_w_, stop_));
     }
     writer.plan().run_duration_s.push_back(answer.duration_s);
     writer.dwell(run.dwell_before_s, run.knots.front().pose, run.payload_kg);
@@ -616,8 +611,7 @@ Result<Plan> Request::written() {
 Result<Request> solved(const robot::RobotModel& robot, const DriveLoads& loads, const Path& path,
                        const Problem& problem, const std::stop_token& stop) {
   auto request = Request::make(robot, loads, path, problem, stop);
-  if (!request) return request;
-  if (auto done = request->solve(); !done) return tl::unexpected(std::move(done.error()));
+  if (request) TRY(request->solve());
   return request;
 }
 
@@ -655,9 +649,8 @@ std::string_view name_of(Bound bound) {
 }
 
 Result<Planner> Planner::make(const robot::RobotModel& robot, std::optional<double> regeneration) {
-  auto loads = DriveLoads::make(robot, regeneration);
-  if (!loads) return tl::unexpected(std::move(loads.error()));
-  return Planner(robot, std::move(*loads));
+  TRY_ASSIGN(auto loads, DriveLoads::make(robot, regeneration));
+  return Planner(robot, std::move(loads));
 }
 
 Result<Plan> Planner::plan(const Path& path, const Problem& problem, std::stop_token stop) const {
@@ -699,36 +692,25 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
   // Seconds late under a speed limit; the end speeds must remain allowed.
   const auto late = [&](double speed) -> Result<double> {
     limited.limits.speed_m_s = speed;
-    auto request = Request::make(robot_, loads_, path, limited, stop);
-    if (!request) return tl::unexpected(request.error());
-    return request->least_time_s() - deadline;
+    TRY_ASSIGN(Request request, Request::make(robot_, loads_, path, limited, stop));
+    return request.least_time_s() - deadline;
   };
-  const auto fastest = late(problem.limits.speed_m_s);
-  if (!fastest) return fastest;
-  if (*fastest > 1e-6 * deadline) {
-    return too_soon(deadline, deadline + *fastest);
-  }
+  TRY_ASSIGN(const double fastest, late(problem.limits.speed_m_s));
+  if (fastest > 1e-6 * deadline) return too_soon(deadline, deadline + fastest);
   const double ends = std::max(problem.start_speed_m_s, problem.end_speed_m_s);
   if (path.distance_m() == 0) return 0.0;
   // No slower than the distance over the whole time.
   double low = std::max({ends, path.distance_m() / deadline, problem.limits.least_speed_m_s, 1e-9});
-  double late_low = 0;
-  if (const auto at = late(low); at)
-    late_low = *at;
-  else
-    return at;
+  TRY_ASSIGN(const double late_low, late(low));
   if (late_low <= 0) return low;
-  double high = low;
-  double late_high = late_low;
+  double high = low, late_high = late_low;
   while (late_high > 0) {
     high *= 2;
     if (high >= problem.limits.speed_m_s) {
-      high = problem.limits.speed_m_s, late_high = std::min(*fastest, 0.0);
+      high = problem.limits.speed_m_s, late_high = std::min(fastest, 0.0);
       break;
     }
-    const auto at = late(high);
-    if (!at) return at;
-    late_high = *at;
+    TRY_ASSIGN(late_high, late(high));
   }
   if (!std::isfinite(high)) return high;
   // Time falls as a distance over the speed: nearly linear in its inverse.
@@ -743,23 +725,20 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
   Problem hurried = problem;
   hurried.hurried = true;
   hurried.energy_budget_j.reset();
-  auto request = Request::make(robot_, loads_, path, hurried, stop);
-  if (!request) return tl::unexpected(std::move(request.error()));
-  if (auto solved = request->solve(problem.value_of_time_w); !solved)
-    return tl::unexpected(std::move(solved.error()));
-  const PlanCost free = request->cost();
+  TRY_ASSIGN(Request request, Request::make(robot_, loads_, path, hurried, stop));
+  TRY(request.solve(problem.value_of_time_w));
+  const PlanCost free = request.cost();
   std::vector<PlanCost> front{free};
   // The shortest time itself costs an unbounded price; the front ends a hundredth of the way before it.
-  const double shortest = request->least_time_s();
+  const double shortest = request.least_time_s();
   if (free.duration_s < shortest * (1 + 1e-5)) return front;
   const double fastest = std::max(shortest * (1 + 2e-6), shortest + 0.01 * (free.duration_s - shortest));
   const double spacing = (free.duration_s - fastest) / static_cast<double>(count - 1);
   for (std::size_t k = 1; k < count; ++k) {
     const double deadline = free.duration_s - static_cast<double>(k) * spacing;
-    if (auto met = request->meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing)); !met)
-      return tl::unexpected(std::move(met.error()));
+    TRY(request.meet(deadline, std::min(1e-4 * deadline, 0.1 * spacing)));
     // Nearer to the shortest time than grids distinguish, motions are the same.
-    if (const PlanCost cost = request->cost(); cost.duration_s < front.back().duration_s * (1 - 1e-9))
+    if (const PlanCost cost = request.cost(); cost.duration_s < front.back().duration_s * (1 - 1e-9))
       front.push_back(cost);
   }
   return front;
@@ -767,9 +746,8 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
 
 Result<Plan> plan(const robot::RobotModel& robot, const Path& path, const Problem& problem,
                   std::stop_token stop) {
-  auto planner = Planner::make(robot, problem.regeneration);
-  if (!planner) return tl::unexpected(std::move(planner.error()));
-  return planner->plan(path, problem, std::move(stop));
+  TRY_ASSIGN(const Planner planner, Planner::make(robot, problem.regeneration));
+  return planner.plan(path, problem, std::move(stop));
 }
 
 }  // namespace joulecast::planning

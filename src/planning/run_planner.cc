@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "base/try.h"
 #include "planning/gauss.h"
 #include "planning/peaks.h"
 #include "planning/root.h"
@@ -535,7 +536,7 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
     if (planner.motion_ && (rests || std::isfinite(planner.shortest_s()))) return planner;
     planner.motion_.reset();
   }
-  if (auto ok = planner.build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
+  TRY(planner.build_grid());
   return planner;
 }
 
@@ -698,16 +699,12 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
   if (auto answer = closed_form(price_w)) return std::move(*answer);
   if (uniform_ && !motion_ && !grid_) find_motion();
   if (motion_) {
-    auto motion = motion_->solve(price_w);
-    if (!motion) return tl::unexpected(std::move(motion.error()));
-    return answer_of(std::move(*motion));
+    TRY_ASSIGN(SteppedMotion motion, motion_->solve(price_w));
+    return answer_of(std::move(motion));
   }
-  if (!grid_) {
-    if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
-  }
-  const auto solution = solve_grid(price_w, stop);
-  if (!solution) return tl::unexpected(solution.error());
-  return answer_of(*solution, nodes_, price_w);
+  if (!grid_) TRY(build_grid());
+  TRY_ASSIGN(const SpeedSolution solution, solve_grid(price_w, stop));
+  return answer_of(solution, nodes_, price_w);
 }
 
 Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_token& stop) {
@@ -870,9 +867,7 @@ Result<RunAnswer> RunPlanner::fastest() {
                   "is the shortest time, which needs a limit of acceleration");
     return answer_of(std::move(*motion));
   }
-  if (!grid_) {
-    if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
-  }
+  if (!grid_) TRY(build_grid());
   const FastMotion& fast = fastest_motion();
   RunAnswer answer = answer_of(fast.solution, fast.nodes, 0);
   answer.discretisation_j = 0;  // that of the last solution, at another price

@@ -9,6 +9,8 @@
 namespace joulecast::planning {
 namespace {
 
+constexpr int bisections = 40;
+
 // Torque of a wheel without smoothing.
 double torque_of(const WheelLoad& w, double v, double q) {
   const double direction = w.direction(v);
@@ -122,40 +124,36 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.back() = grid.end;
 
   const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
-  // By how much the use of the motors in a cell exceeds their limits: it lies between its values at the ends.
-  const auto excess = [&](std::size_t cell, double z0, double z1) {
+  // Within a cell, motor use lies between its values at the two ends.
+  const auto allowed = [&](std::size_t cell, double z0, double z1) {
     const double q = (z1 - z0) / (2 * grid.step[cell]);
-    return std::max(motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q),
-                    motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q)) -
-           1;
-  };
-  // The greatest z up to `most` without excess, or `least`.
-  const auto last_within = [](auto&& over, double least, double most) {
-    constexpr double relative = 1e-12;
-    const double far = over(most);
-    if (!(far > 0)) return most;
-    const double near = over(least);
-    return near < 0 ? (1 - 2 * relative) * zero_between(over, least, near, most, far, relative) : least;
+    return motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q) <= 1 &&
+           motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q) <= 1;
   };
   // Where a steady speed is already too much for the motors, the ceiling is lower.
-  for (std::size_t k = 0; k <= n && motors; ++k) {
-    const WheelLoads &before = grid.load(k > 0 ? k - 1 : 0, 1), &after = grid.load(std::min(k, n - 1), 0);
-    const auto over = [&](double z) {
-      const double v = std::sqrt(z);
-      return std::max(motor_use(grid, before, v, 0), motor_use(grid, after, v, 0)) - 1;
-    };
-    e.fastest[k] = last_within(over, 0, e.fastest[k]);
+  if (motors) {
+    for (std::size_t k = 0; k <= n; ++k) {
+      const std::size_t before = k > 0 ? k - 1 : 0, after = std::min(k, n - 1);
+      const auto fits = [&](double z) {
+        return motor_use(grid, grid.load(before, 1), std::sqrt(z), 0) <= 1 &&
+               motor_use(grid, grid.load(after, 0), std::sqrt(z), 0) <= 1;
+      };
+      if (!fits(e.fastest[k])) e.fastest[k] = last_that(fits, 0, e.fastest[k], bisections);
+    }
   }
-  // The largest z at the far end of a cell that can be reached by speeding up from the near end. Slowing down
-  // is the other sweep's concern.
+  // The largest z at the far end of a cell that can be reached by speeding up from the near end; bisection
+  // only where motors bind. Slowing down is the other sweep's concern.
   const auto reach = [&](std::size_t cell, double near, double cap, bool forward) {
     if (cap <= near) return cap;
     const double top = std::isfinite(grid.acceleration_limit)
                            ? std::min(cap, near + 2 * grid.step[cell] * grid.acceleration_limit)
                            : cap;
-    if (!motors) return top;
-    const auto over = [&](double far) { return forward ? excess(cell, near, far) : excess(cell, far, near); };
-    return over(near) > 0 ? last_within(over, 0, near) : last_within(over, near, top);
+    const auto fits = [&](double far) {
+      return forward ? allowed(cell, near, far) : allowed(cell, far, near);
+    };
+    if (!motors || fits(top)) return top;
+    const bool steady = fits(near);
+    return last_that(fits, steady ? near : 0, steady ? top : near, bisections);
   };
   for (int sweep = 0; sweep < (motors ? 2 : 1); ++sweep) {
     for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = reach(k, e.fastest[k], e.fastest[k + 1], true);

@@ -30,6 +30,13 @@ TEST(Calibrate, RecoversTheSimulatedBattery) {
   // The slow test ends at the cut-off, a little before the true charge is gone.
   EXPECT_NEAR(found.capacity_ah * *found.ageing_factor, 2.25, 0.01 * 2.25);
   EXPECT_EQ(found.capacity_ah, 2.5);
+  // The ohmic share is not separable from a fast branch; the resistance to a steady current is.
+  const auto steady_ohm = [](const robot::Battery& battery) {
+    double sum = battery.internal_resistance_ohm;
+    for (const auto& branch : battery.branches) sum += branch.resistance_ohm;
+    return sum;
+  };
+  EXPECT_NEAR(steady_ohm(found), steady_ohm(true_battery), 0.05 * steady_ohm(true_battery));
   EXPECT_EQ(found.reserve_fraction, 0.2);
   EXPECT_NEAR(*found.cutoff_voltage_v, 2.5, 0.01);
   // A discharge that was not used for the fit: its time to 0.5 %, its voltage to twice the error of 0.135 %

@@ -146,8 +146,34 @@ TEST(ReversingWheel, KeepsItsCurrentLimit) {
   EXPECT_LT(greatest_use(asked, plan->profile), 1 + 2e-4);
 }
 
+// Between the knots of a detour, 1 cm apart, the curvature's slope jumps, and the torque with it.
+TEST(Detours, KeepTheirCurrentLimit) {
+  test::Asked asked;
+  asked.robot = test::amr();
+  asked.path =
+      *make_path(std::vector<Segment>{GaussianDetour{6, 0.6, 3, 0.7}, GaussianDetour{6, -0.6, 3, 0.7}},
+                 PathOptions{.start = {}, .payload_kg = 20});
+  asked.problem.limits = limits_of(asked.robot);
+  asked.problem.limits.current_a = 3.5;
+  oracle::Question& q = asked.question;
+  q.robot = asked.robot;
+  q.payload_kg = 20;
+  q.current_a = 3.5, q.voltage_v = asked.problem.limits.voltage_v;
+  for (const Knot& knot : asked.path.runs[0].knots)
+    q.way.at.push_back(knot.way), q.way.curvature_1_m.push_back(knot.curvature_1_m);
+  const auto free = plan(asked.robot, asked.path, asked.problem);
+  ASSERT_TRUE(free) << describe(free.error());
+  EXPECT_LT(greatest_use(asked, free->profile), 1 + 2e-4);
+  asked.problem.deadline_s = 0.5 * (free->certificate.shortest_time_s + free->summary.duration_s);
+  const auto hurried = plan(asked.robot, asked.path, asked.problem);
+  ASSERT_TRUE(hurried) << describe(hurried.error());
+  EXPECT_LT(greatest_use(asked, hurried->profile), 1 + 2e-4);
+}
+
 INSTANTIATE_TEST_SUITE_P(SixProblems, EffectsAgainstIpopt, ::testing::Range(1000, 1006));
 INSTANTIATE_TEST_SUITE_P(LongRest, EffectsAgainstIpopt, ::testing::Range(1006, 1040));
+INSTANTIATE_TEST_SUITE_P(ThreeGears, EffectsAgainstIpopt, ::testing::Range(2003, 2006));
+INSTANTIATE_TEST_SUITE_P(LongGears, EffectsAgainstIpopt, ::testing::Range(2006, 2036));
 INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, ::testing::Range(100, 114));
 INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, ::testing::Range(114, 150));
 

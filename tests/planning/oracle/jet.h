@@ -67,6 +67,16 @@ inline Jet tanh(const Jet& a) {
   return chain(a, y, slope, -2 * y * slope);
 }
 
+// sqrt(a^2 + width^2), which is |a| but near 0.
+inline Jet soft_abs(const Jet& a, double width) {
+  const double y = std::hypot(a.f, width);
+  return chain(a, y, a.f / y, width * width / (y * y * y));
+}
+
+inline double soft_abs(double a, double width) {
+  return std::hypot(a, width);
+}
+
 inline double value_of(const Jet& a) {
   return a.f;
 }

@@ -13,6 +13,8 @@ namespace joulecast::oracle {
 namespace {
 
 constexpr double unlimited = 1e19;  // IPOPT's infinity
+constexpr double soft_nm =
+    2e-2;  // torque below which a gear's loss is smoothed; with 1e-3 it rarely converges
 
 // Gauss-Legendre's three points of [0, 1] and their weights.
 constexpr double gauss_at[] = {0.11270166537925831, 0.5, 0.8872983346207417};
@@ -41,8 +43,9 @@ struct Motors {
 
 // Thesis chapter 2 (right wheel first): F = m dv - m_c d yaw^2, N = I dyaw + m_c d v yaw, load torque
 // r F/2 +- r N/(2 l) + I_w dw, motor K_t n i = I_s dw + nu w + T_m sgn(w) + load, V = R i + K_w n w.
+// The gear loses a share of the torque that it passes on.
 template <class T>
-Motors<T> motors(const Question& q, const Bend& bend, const T& u, const T& du) {
+Motors<T> motors(const Question& q, const Bend& bend, const T& u, const T& du, double smoothed_nm) {
   const auto& [kin, mass, motor] = std::tie(q.robot.kinematics, q.robot.mass, q.robot.motor);
   const double r = kin.wheel_radius_m, l = kin.half_track_m;
   const double m = mass.chassis_kg + 2 * mass.wheel_kg + q.payload_kg;
@@ -64,12 +67,15 @@ Motors<T> motors(const Question& q, const Bend& bend, const T& u, const T& du) {
     const T w = T(1 / r) * (v + T(sign * l) * yaw), dw = T(1 / r) * (dv + T(sign * l) * dyaw);
     // The direction of a wheel does not change along the way: by the coordinate, not by a speed near zero.
     const double turning = in_place ? sign : 1 + sign * l * bend.curvature;
-    const double dry = motor.friction_torque_nm[static_cast<std::size_t>(side)] * (turning > 0   ? 1.0
-                                                                                   : turning < 0 ? -1.0
-                                                                                                 : 0.0);
-    const T load = T(0.5 * r) * force + T(sign * 0.5 * r / l) * moment + T(mass.wheel_inertia_kg_m2) * dw;
-    const T torque =
-        T(motor.rotor_inertia_kg_m2) * dw + T(motor.viscous_friction_nm_s_rad) * w + T(dry) + load;
+    const double direction = turning > 0 ? 1.0 : turning < 0 ? -1.0 : 0.0;
+    const T friction = T(motor.viscous_friction_nm_s_rad) * w +
+                       T(direction * motor.friction_torque_nm[static_cast<std::size_t>(side)]);
+    const T passed = T(0.5 * r) * force + T(sign * 0.5 * r / l) * moment +
+                     T(mass.wheel_inertia_kg_m2 + motor.rotor_inertia_kg_m2) * dw;
+    T torque = passed + friction;
+    if (q.gear_loss > 0)
+      torque = torque +
+               T(direction * q.gear_loss) * soft_abs(passed + T(q.gear_of_friction) * friction, smoothed_nm);
     const double constant = motor.torque_constant_nm_a * motor.gear_ratio;
     out.current[side] = T(1 / constant) * torque;
     out.voltage[side] = T(motor.resistance_ohm) * out.current[side] +
@@ -122,7 +128,7 @@ class Transcription final : public Ipopt::TNLP {
         // Where the robot then is, by the speeds of the last iterate: curvature changes little within a cell.
         const double mean = value_of(u0) + value_of(u1);
         const double share = mean > 0 ? f * (2 * value_of(u0) + f * (value_of(u1) - value_of(u0))) / mean : f;
-        const auto at = motors(q_, bend_at(q_.way, nodes_[k] + h * share), u, a);
+        const auto at = motors(q_, bend_at(q_.way, nodes_[k] + h * share), u, a, soft_nm);
         for (int side : {0, 1}) {
           const T e = T(gauss_weight[g]) * at.power[side] * c.duration;
           if (lossy_)
@@ -137,7 +143,7 @@ class Transcription final : public Ipopt::TNLP {
       const T u = place == 0 ? u0 : place == 1 ? T(0.5) * (u0 + u1) : u1;
       // Just inside the cell: the curvature's slope may jump at its ends.
       const double s = nodes_[k] + h * (place == 0 ? 1e-9 : place == 1 ? 0.5 : 1 - 1e-9);
-      const auto at = motors(q_, bend_at(q_.way, s), u, a);
+      const auto at = motors(q_, bend_at(q_.way, s), u, a, soft_nm);
       for (int side : {0, 1}) {
         if (std::isfinite(q_.current_a)) c.bounded.push_back(at.current[side]);
         if (std::isfinite(q_.voltage_v)) c.bounded.push_back(at.voltage[side]);
@@ -451,7 +457,7 @@ Found solve(const Question& q, std::vector<double> nodes, const Found* before) {
 }  // namespace
 
 Drive drive_at(const Question& q, double way, double speed, double acceleration) {
-  const auto at = motors<double>(q, bend_at(q.way, way), speed, acceleration);
+  const auto at = motors<double>(q, bend_at(q.way, way), speed, acceleration, 0);
   Drive d{};
   d.battery_w = q.robot.idle_power_w;
   for (int side : {0, 1}) {

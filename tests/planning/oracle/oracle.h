@@ -27,6 +27,8 @@ struct Question {
   double regeneration = 1;                // share of braking power that the battery takes
   double driver_loss = 0;                 // of the motors' absolute power
   double scrub = 0, scrub_rate_rad_s = 0.02;
+  double gear_loss = 0;         // of the torque that the gear passes on, at any direction of power
+  double gear_of_friction = 0;  // share of the motors' friction that it passes on
   double value_of_time_w = 0;
   std::optional<double> deadline_s;
   double speed_m_s = std::numeric_limits<double>::infinity();

@@ -121,7 +121,8 @@ inline Asked random_question(std::uint64_t seed) {
 }
 
 // Likewise with an effect, twice and more of the acceleration, and curves so tight that the inner wheel
-// reverses.
+// reverses; from `first_of_gears` on with loss in the gear, before with one in the driver or scrub.
+inline constexpr int first_of_gears = 2000;
 inline Asked random_effect_question(std::uint64_t seed) {
   Asked a = random_question(seed);
   std::mt19937_64 random(seed * 2862933555777941757u + 3037000493u);
@@ -144,7 +145,10 @@ inline Asked random_effect_question(std::uint64_t seed) {
     a.robot.effects.push_back({id, std::move(values)});
     a.label += std::string(" ") + id;
   };
-  if (one_of(3) > 0) {
+  if (seed >= first_of_gears) {
+    q.gear_loss = between(0.02, 0.4), q.gear_of_friction = between(0, 1);
+    adopt("gear_efficiency", {{"loss", q.gear_loss}, {"of_friction", q.gear_of_friction}});
+  } else if (one_of(3) > 0) {
     q.driver_loss = between(0.02, 0.1);
     adopt("driver_loss", {{"fraction", q.driver_loss}});
   } else {
