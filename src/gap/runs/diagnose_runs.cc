@@ -66,17 +66,15 @@ class RunDiagnoser {
     RunChecks checked = check_runs(rows_);
     d.checks = std::move(checked.checks);
     const auto contradicted = std::ranges::find(d.checks, true, &Check::contradicted);
-    if (contradicted != d.checks.end()) {
-      // Energies that were not measured show no cause.
-      d.verdict_probability = 1;
-      d.reasons = {contradicted->says};
-      d.refusal = contradicted->says;
-      add_limits();
-      return std::move(r_);
-    }
+    if (contradicted != d.checks.end()) return nothing_to_judge(contradicted->says);
     rows_.silence(checked.apart);
     report(0);
     fit_ = posterior::walk(rows_.data());
+    if (!(fit_->noise.back().sigma > 0))
+      return nothing_to_judge(
+          "The energies follow from the conditions of the runs to the last digit: they were computed, or "
+          "there "
+          "are too few runs for so many conditions.");
     answer_ = posterior::explain(*fit_);
     report(after_search);
     judge_runs();
@@ -87,6 +85,16 @@ class RunDiagnoser {
   }
 
  private:
+  // Energies that were not measured show no cause.
+  RunDiagnosis nothing_to_judge(const std::string& why) {
+    Diagnosis& d = r_.diagnosis;
+    d.verdict_probability = 1;
+    d.reasons = {why};
+    d.refusal = why;
+    add_limits();
+    return std::move(r_);
+  }
+
   void report(double part) const {
     if (progress_) progress_(part);
   }

@@ -188,6 +188,26 @@ TEST(MadeRuns, EstimatesScatterAndNamesNothing) {
   EXPECT_EQ(named, 0);
 }
 
+// Tables 3-3 and 3-4 in part, with a surface for every other run: six runs that these conditions describe
+// completely.
+TEST(ThesisTables, ExactFitsJudgeNothing) {
+  const RunFile file{"runs.csv",
+                     "table,distance_m,speed_m_s,acceleration_m_s2,payload_kg,right_j,left_j,label:surface\n"
+                     "empty,10,0.5,0.125,0,53.67,56.25,tile\n"
+                     "empty,10,0.7,0.175,0,56.33,60.26,carpet\n"
+                     "empty,10,0.9,0.225,0,56.78,60.76,tile\n"
+                     "loaded,10,0.5,0.125,8.25,64.81,67.56,carpet\n"
+                     "loaded,10,0.7,0.175,8.25,66.38,70.40,tile\n"
+                     "loaded,10,0.9,0.225,8.25,66.62,70.90,carpet\n"};
+  const auto runs = read_runs({&file, 1}, nomad());
+  ASSERT_TRUE(runs) << describe(runs.error());
+  const Diagnosis d = diagnosed(*runs).diagnosis;
+  EXPECT_EQ(d.verdict, Verdict::inconclusive);
+  EXPECT_TRUE(d.effects.empty());
+  ASSERT_EQ(d.reasons.size(), 1u);
+  EXPECT_NE(d.reasons.front().find("too few runs"), std::string::npos) << d.reasons.front();
+}
+
 TEST(MadeRuns, NamesCovariateWithCoefficient) {
   std::mt19937_64 random(3);
   RunSet set;
