@@ -31,6 +31,16 @@ constexpr std::size_t ripple_surrogates = 20;
 // Progress of the stages, as parts of the whole.
 constexpr double of_step = 0.1, after_walk = 0.6, after_answer = 0.9;
 
+// States that the readings of a contradicted channel were corrected, where its error is known.
+void state_correction(Check& check) {
+  if (!check.factor && !check.swapped) return;
+  check.contradicted = false;  // any more
+  check.says += fmt::format(
+      " The diagnosis uses readings that are {}{}.",
+      check.swapped ? "exchanged" : fmt::format("divided by this factor, {:.4g}", *check.factor),
+      std::isfinite(check.probability) ? " (probability " + probability_text(check.probability) + ")" : "");
+}
+
 class Diagnoser {
  public:
   Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
@@ -48,9 +58,12 @@ class Diagnoser {
     measure();
     if (d_.power == PowerSource::battery && from_motion_of(readings_).power) {
       if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_)) {
-        d_.checks.push_back(std::move(*check));
-        d_.motion_known = false;
-        return nothing_to_judge();
+        telemetry::RecordingSet others = recordings_;
+        silence_contradicted(others, std::array{*check});
+        state_correction(*check);
+        Result<Diagnosis> d = Diagnoser(others, robot_, progress_).run();
+        if (d) d->checks.insert(d->checks.begin(), std::move(*check));
+        return d;
       }
     }
     const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
@@ -348,14 +361,7 @@ std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, const 
   std::vector<Check> checks = plausibility::drop_impossible(recordings, robot);
   std::ranges::move(plausibility::check_recordings(recordings, robot), std::back_inserter(checks));
   silence_contradicted(recordings, checks);
-  for (Check& check : checks) {
-    if (!check.factor && !check.swapped) continue;
-    check.contradicted = false;  // any more
-    check.says += fmt::format(
-        " The diagnosis uses readings that are {}{}.",
-        check.swapped ? "exchanged" : fmt::format("divided by this factor, {:.4g}", *check.factor),
-        std::isfinite(check.probability) ? " (probability " + probability_text(check.probability) + ")" : "");
-  }
+  std::ranges::for_each(checks, state_correction);
   return checks;
 }
 

@@ -75,17 +75,20 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
     if (other.fault == best->fault || other.gap > best->gap / clearly) continue;
     also += (also.empty() ? "; " : " or ") + other.fault->cause;
   }
-  if (!also.empty()) also += " would have nearly the same effect";
+  const bool only = also.empty();
+  if (!only) also += " would have nearly the same effect";
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  return Check{best->fault->id,
-               best->fault->channel,
-               factor,
-               {unknown, unknown},
-               fmt::format("wheel_velocity looks {}: as recorded, the robot file misses {} of the battery's "
-                           "power with any base load, and of speeds divided by {:.3g} it misses {}; "
-                           "joulecast expects rad/s at the wheel, positive forward, right before left{}.",
-                           best->fault->cause, percent(gap), factor, percent(best->gap), also),
-               true};
+  Check check{best->fault->id,
+              best->fault->channel,
+              factor,
+              {unknown, unknown},
+              fmt::format("wheel_velocity looks {}: as recorded, the robot file misses {} of the battery's "
+                          "power with any base load, and of speeds divided by {:.3g} it misses {}; "
+                          "joulecast expects rad/s at the wheel, positive forward, right before left{}.",
+                          best->fault->cause, percent(gap), factor, percent(best->gap), also),
+              true};
+  if (only) check.factor = factor;
+  return check;
 }
 
 }  // namespace joulecast::gap

@@ -9,8 +9,8 @@
 namespace joulecast::gap {
 
 // A unit of the wheels' speeds with which the robot file's power agrees with the measured power of the
-// windows, where it differs widely as recorded, with any base load. For recordings in which power is the only
-// evidence.
+// windows, where it differs widely as recorded, with any base load. It has a factor if no other unit agrees
+// nearly as well. For recordings in which power is the only evidence.
 std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
                                           std::span<const dynamics::ActiveEffect> in_file,
                                           std::span<const Window> windows, std::span<const double> power_w);

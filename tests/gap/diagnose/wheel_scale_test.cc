@@ -51,6 +51,31 @@ TEST(WheelScale, BaseLoadIsNoUnit) {
     EXPECT_FALSE(judge({made::cause("accessory_load", load_w)}, 1)) << load_w;
 }
 
+// Wheels that are counted twice, with battery power as the only other reading.
+TEST(Diagnose, CorrectsUnitShownByPower) {
+  const made::Robot robot = made::virtual_robot("amr", 21, [](virtual_robot::SimulationSpec& spec) {
+    spec.sensors.motor_channels = false;
+    spec.missions = 3;
+  });
+  telemetry::RecordingSet twice = robot.recordings, sound = robot.recordings;
+  for (telemetry::RecordingSet* set : {&twice, &sound})
+    for (telemetry::Recording& mission : set->missions)
+      for (signals::Sample& s : mission.samples) {
+        s.yaw_rate_rad_s = s.velocity_command[0] = s.velocity_command[1] = signals::unmeasured;
+        s.pose.fill(signals::unmeasured);
+        for (double& w : s.wheel_velocity_rad_s) w *= set == &twice ? 2 : 1;
+      }
+  const auto expected = diagnose(sound, robot.model, {});
+  const auto found = diagnose(twice, robot.model, {});
+  ASSERT_TRUE(expected && found);
+  EXPECT_NEAR(found->power_absolute_relative, expected->power_absolute_relative, 1e-9);
+  EXPECT_EQ(found->verdict, expected->verdict);
+  const auto check = std::ranges::find(found->checks, "wheel_velocity_scale", &Check::id);
+  ASSERT_NE(check, found->checks.end());
+  EXPECT_FALSE(check->contradicted);
+  EXPECT_NE(check->says.find("divided by this factor, 2."), std::string::npos) << check->says;
+}
+
 // With a factor that gyro and power confirm, recordings are diagnosed as without it; impossible readings are
 // as if they had not been measured.
 TEST(Diagnose, UsesConfirmedFactor) {
