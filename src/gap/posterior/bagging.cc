@@ -47,7 +47,8 @@ std::vector<Content> contents(const Fit& fit) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.columns;
       // Without motor channels kinematics are checks of the data, not causes of a gap in power.
-      const Eigen::VectorXd& size = own_channels && shows_elsewhere(hypothesis) ? e.moves : e.share;
+      const Eigen::VectorXd& size =
+          shows_elsewhere(hypothesis) && !fit.data.at_readings() ? e.moves : e.share;
       double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
