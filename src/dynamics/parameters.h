@@ -8,7 +8,7 @@ namespace joulecast::dynamics {
 
 // Wheel speed below which dry friction fades [rad/s], and current below which the brush drop does [A].
 inline constexpr double friction_width_rad_s = 0.005;
-inline constexpr double brush_width_a = 0.001;
+inline constexpr double brush_width_a = 0.01;
 
 // Resistance of copper grows by this fraction a kelvin.
 inline constexpr double copper_temperature_coefficient_per_k = 0.00393;

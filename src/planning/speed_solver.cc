@@ -162,7 +162,7 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
     const Torque t = torque(w, v, q);
     double energy = (e.copper_w_n2_m2[s] * t.t / v + e.back_emf * w.pace) * t.t;
     if (e.brush_w_nm != 0) {
-      energy += e.brush_w_nm * t.t * t.t / (v * std::hypot(t.t, std::max(e.brush_width_nm, gear_smoothing_)));
+      energy += e.brush_w_nm * t.t * t.t / (v * std::sqrt(t.t * t.t + e.brush_width_nm * e.brush_width_nm));
     }
     f += mean_slope_ * energy;
     if (half_jump_ != 0) f += half_jump_ * std::sqrt(energy * energy + smoothing_ * smoothing_);
@@ -282,8 +282,7 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     double cross = -2 * density * i;       // d2/dT dv
     double direct_vv = 2 * density * t.t * i * i;
     if (e.brush_w_nm != 0) {
-      const double least = std::max(e.brush_width_nm, gear_smoothing_), width = least * least,
-                   root = std::sqrt(t.t * t.t + width);
+      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t.t * t.t + width);
       const double y = e.brush_w_nm * t.t * t.t / root;
       const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) / (root * root * root);
       const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) / (root * root * root * root * root);

@@ -14,8 +14,6 @@ namespace {
 
 using signals::Sample;
 
-constexpr double noise_a = 0.01;  // of current sensors: less has no sign
-
 // Median distance between neighbouring values among readings that differ: the step of a coarse converter,
 // next to nothing for a fine one.
 double step_of(std::vector<double> readings) {
@@ -134,7 +132,7 @@ class Builder {
          {&c.power[s], &c.power_abs[s], &c.braking[s], &c.current_sign[s], &c.angle[s], &c.slid[s]})
       values->resize(n);
     copper_w.resize(n);
-    const double soft_a = 0.1 * friction_current_a(s) + noise_a;
+    const double soft_a = 0.1 * friction_current_a(s) + dynamics::brush_width_a;
     for (std::size_t k = 0; k < n; ++k) {
       const double speed = c.smooth_speed[s][k], power = volts[k] * amps[k];
       c.power[s][k] = c.voltage[s][k] * c.current[s][k];

@@ -22,8 +22,7 @@ struct Reference {
   double faded_j = 0;   // saved where friction is T w / sqrt(w^2 + width^2), to first order of the width
 };
 
-Reference reference_of(const robot::RobotModel& r, double payload_kg, const Profile& rows,
-                       double brush_drop_v = 0) {
+Reference reference_of(const robot::RobotModel& r, double payload_kg, const Profile& rows) {
   constexpr double width = 0.005;
   const double radius = r.kinematics.wheel_radius_m, l = r.kinematics.half_track_m;
   const double mass = r.mass.chassis_kg + 2 * r.mass.wheel_kg + payload_kg;
@@ -46,8 +45,7 @@ Reference reference_of(const robot::RobotModel& r, double payload_kg, const Prof
                               (r.mass.wheel_inertia_kg_m2 + r.motor.rotor_inertia_kg_m2) * rate;
       const auto power = [&](double w) {
         const double torque = inertial + r.motor.viscous_friction_nm_s_rad * w + way * dry;
-        const double current = torque / constant;
-        return r.motor.resistance_ohm * current * current + w * torque + brush_drop_v * std::fabs(current);
+        return r.motor.resistance_ohm * torque * torque / (constant * constant) + w * torque;
       };
       sum.energy_j += span / 6 * (power(w0) + 4 * power(0.5 * (w0 + w1)) + power(w1));
       // The integrals over the speed of 1 - s and 1 - s^2, s = w / sqrt(w^2 + width^2), are width and
@@ -86,15 +84,6 @@ double metered_j(const robot::RobotModel& robot, double payload_kg, const Profil
   return accounts.modelled_j - robot.idle_power_w * (accounts.duration_s - rows.time_s.back());
 }
 
-double estimated_j(const robot::RobotModel& robot, double payload_kg, const Profile& rows) {
-  std::vector<energy::MotionPoint> points;
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    points.push_back({rows.time_s[k], rows.speed_m_s[k], rows.yaw_rate_rad_s[k]});
-  const auto estimate = energy::estimate_motion(*dynamics::drive_model(robot), points, payload_kg);
-  EXPECT_TRUE(estimate) << describe(estimate.error());
-  return estimate ? estimate->battery_j : 0;
-}
-
 struct Creep {
   Segment segment;
   double payload_kg = 0, acceleration_m_s2 = 0;
@@ -117,48 +106,16 @@ TEST(Creeping, FrictionCountsFromStandstill) {
     ASSERT_TRUE(plan) << describe(plan.error());
     const Profile& rows = plan->profile;
     const Reference reference = reference_of(heavy, creep.payload_kg, rows);
+    std::vector<energy::MotionPoint> points;
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      points.push_back({rows.time_s[k], rows.speed_m_s[k], rows.yaw_rate_rad_s[k]});
+    const auto estimate = energy::estimate_motion(*dynamics::drive_model(heavy), points, creep.payload_kg);
+    ASSERT_TRUE(estimate) << describe(estimate.error());
     const double faded = reference.energy_j - reference.faded_j;
     EXPECT_LT(reference.faded_j, 0.01 * reference.energy_j);
     EXPECT_NEAR(plan->summary.energy_j, faded, 3e-4 * faded);
-    EXPECT_NEAR(estimated_j(heavy, creep.payload_kg, rows), faded, 3e-4 * faded);
+    EXPECT_NEAR(estimate->battery_j, faded, 3e-4 * faded);
     EXPECT_NEAR(metered_j(heavy, creep.payload_kg, rows), faded, 1e-3 * faded);
-  }
-}
-
-// A toy with motors that take 5 mA: its brushes take a quarter of the energy. The drop fades as the square of
-// 1 mA over the current does, here 2 % of it.
-TEST(SmallCurrents, BrushesCountUnderTenMilliamps) {
-  constexpr double drop_v = 0.6, faded = 0.012;
-  robot::RobotModel toy;
-  toy.robot_id = "toy";
-  toy.kinematics = {.wheel_radius_m = 0.02, .half_track_m = 0.04, .com_offset_m = 0};
-  toy.mass = {.chassis_kg = 0.39, .wheel_kg = 0.02, .yaw_inertia_kg_m2 = 5e-4, .wheel_inertia_kg_m2 = 4e-6};
-  toy.motor = {.resistance_ohm = 10,
-               .inductance_h = 0,
-               .torque_constant_nm_a = 0.003,
-               .voltage_constant_v_s_rad = 0.003,
-               .gear_ratio = 30,
-               .rotor_inertia_kg_m2 = 0,
-               .viscous_friction_nm_s_rad = 0,
-               .friction_torque_nm = {4.5e-4, 4.2e-4}};
-  toy.battery.nominal_voltage_v = 6;
-  toy.idle_power_w = 0.005;
-  toy.limits = {.speed_m_s = 0.2, .acceleration_m_s2 = 0.05, .yaw_rate_rad_s = 2, .current_a = 1};
-  toy.effects = {{"brush_drop", {{"voltage_v", drop_v}}}};
-  for (const Segment& segment : {Segment{Straight{3}}, Segment{TurnInPlace{3}}}) {
-    const auto path = make_path(std::vector<Segment>{segment}, {});
-    ASSERT_TRUE(path);
-    Problem problem;
-    problem.limits = limits_of(toy);
-    const auto plan = planning::plan(toy, *path, problem);
-    ASSERT_TRUE(plan) << describe(plan.error());
-    const Reference full = reference_of(toy, 0, plan->profile, drop_v),
-                    bare = reference_of(toy, 0, plan->profile);
-    const double energy_j = full.energy_j - bare.faded_j;
-    EXPECT_GT(full.energy_j - bare.energy_j, 0.2 * energy_j);
-    EXPECT_NEAR(plan->summary.energy_j, energy_j, faded * energy_j);
-    EXPECT_NEAR(estimated_j(toy, 0, plan->profile), energy_j, faded * energy_j);
-    EXPECT_NEAR(metered_j(toy, 0, plan->profile), energy_j, faded * energy_j);
   }
 }
 
