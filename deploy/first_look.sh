@@ -6,6 +6,7 @@
 set -euo pipefail
 project=$(cd "$(dirname "$0")/.." && pwd)
 folder=${JOULECAST_FIRST_LOOK:-$HOME/joulecast-first}
+unset JOULECAST_FIRST_LOOK # the daemon reads JOULECAST_* as settings
 mkdir -p "$folder"
 cd "$folder"
 if [ -f pid ]; then
@@ -21,8 +22,8 @@ joulecast simulate --robots 1 --robot "$robot" --seed 7 --missions 6 --mission-d
 joulecast replay amr.lcmlog --into first.db --robot "$robot" > accounts.txt
 joulecastd --store-path first.db --robots-directory "$project/deploy/robots" --lcm-url memq:// --http-port "$1" > joulecastd.log 2>&1 &
 echo $! > pid
-for _ in $(seq 100); do
-  ! curl -sf "http://127.0.0.1:$1/readyz" > /dev/null || break
-  sleep 0.1
-done
+if ! curl -sf --retry 20 --retry-delay 1 --retry-all-errors "http://127.0.0.1:$1/readyz" > /dev/null; then
+  cat joulecastd.log >&2
+  exit 1
+fi
 echo "six missions of amr at http://127.0.0.1:$1"
