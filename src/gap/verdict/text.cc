@@ -57,7 +57,8 @@ class Reasons {
 
   std::vector<std::string> all(bool worse_than_regression) {
     if (!d_.motion_known) {
-      say("the motion that needs the power is not recorded, or too short: see the checks of the recordings");
+      say("the recordings have less usable motion of the wheels than the 20 s that a diagnosis needs: they "
+          "are shorter, or their checks exclude it");
       return said_;
     }
     const bool nothing = d_.effects.empty() && d_.verdict == Verdict::inconclusive;
