@@ -340,8 +340,7 @@ void check_faults(const CheckContext& c, Checks& checks) {
         checks.emplace_back(Check{fault.id, fault.channel, measured.factor, measured.interval, {}, true});
     check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
                              fault.cause, e.says, with_interval(e.ratio), e.against,
-                             fault.channel == "utime" ? "us since 1970" : contract_of(fault.channel),
-                             also(explanation.alternatives[k], measured));
+                             contract_of(fault.channel), also(explanation.alternatives[k], measured));
     // A robot file that is wrong by the factor would look the same.
     const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
     check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);

@@ -56,6 +56,7 @@ inline constexpr auto channel_table = std::to_array<Channel>(
      {"payload_mass", reading::payload, 1, false, true, "kg"}});
 
 inline std::string_view contract_of(std::string_view channel) {
+  if (channel == "utime") return "us since 1970";
   for (const Channel& c : channel_table)
     if (channel.starts_with(c.name)) return c.contract;
   return "";

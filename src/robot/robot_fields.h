@@ -57,10 +57,8 @@ struct ObjectWords {
 inline constexpr std::string_view file_words =
     "Parameters of a differential-drive robot. Names end with their units. Inertia and friction are at the "
     "wheel; sides are [right, left]; the payload is over the axle. In addition to this schema a reader "
-    "checks: "
-    "yaw inertia against the parallel-axis bound, ascending curves, cut-off below nominal voltage, idle "
-    "power "
-    "within the capability of the battery.";
+    "checks: yaw inertia against the parallel-axis bound, ascending curves, cut-off below nominal voltage, "
+    "idle power within the capability of the battery.";
 
 inline constexpr std::size_t max_curve_points = 1001;
 inline constexpr std::size_t max_branches = 2;  // and charge lags

@@ -73,8 +73,7 @@ class RunDiagnoser {
     if (!(fit_->noise.back().sigma > 0))
       return nothing_to_judge(
           "The energies follow from the conditions of the runs to the last digit: they were computed, or "
-          "there "
-          "are too few runs for so many conditions.");
+          "there are too few runs for so many conditions.");
     answer_ = posterior::explain(*fit_);
     report(after_search);
     judge_runs();

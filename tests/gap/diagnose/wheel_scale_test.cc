@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -51,22 +52,33 @@ TEST(WheelScale, BaseLoadIsNoUnit) {
     EXPECT_FALSE(judge({made::cause("accessory_load", load_w)}, 1)) << load_w;
 }
 
-// Wheels that are counted twice, with battery power as the only other reading.
-TEST(Diagnose, CorrectsUnitShownByPower) {
+// A robot with battery power alone, as it is and with wheels that are counted twice: what is expected of the
+// second, and what is found. `change` is made to each sample of both: (sample, its index, counted twice).
+template <class Change>
+std::array<Result<Diagnosis>, 2> with_wheels_counted_twice(const Change& change) {
   const made::Robot robot = made::virtual_robot("amr", 21, [](virtual_robot::SimulationSpec& spec) {
     spec.sensors.motor_channels = false;
     spec.missions = 3;
   });
-  telemetry::RecordingSet twice = robot.recordings, sound = robot.recordings;
-  for (telemetry::RecordingSet* set : {&twice, &sound})
-    for (telemetry::Recording& mission : set->missions)
-      for (signals::Sample& s : mission.samples) {
-        s.yaw_rate_rad_s = s.velocity_command[0] = s.velocity_command[1] = signals::unmeasured;
-        s.pose.fill(signals::unmeasured);
-        for (double& w : s.wheel_velocity_rad_s) w *= set == &twice ? 2 : 1;
+  const auto diagnosed = [&](bool twice) {
+    telemetry::RecordingSet set = robot.recordings;
+    for (telemetry::Recording& mission : set.missions)
+      for (std::size_t k = 0; k < mission.samples.size(); ++k) {
+        signals::Sample& s = mission.samples[k];
+        for (double& w : s.wheel_velocity_rad_s) w *= twice ? 2 : 1;
+        change(s, k, twice);
       }
-  const auto expected = diagnose(sound, robot.model, {});
-  const auto found = diagnose(twice, robot.model, {});
+    return diagnose(set, robot.model, {});
+  };
+  return {diagnosed(false), diagnosed(true)};
+}
+
+// With battery power as the only other reading.
+TEST(Diagnose, CorrectsUnitShownByPower) {
+  const auto [expected, found] = with_wheels_counted_twice([](signals::Sample& s, std::size_t, bool) {
+    s.yaw_rate_rad_s = s.velocity_command[0] = s.velocity_command[1] = signals::unmeasured;
+    s.pose.fill(signals::unmeasured);
+  });
   ASSERT_TRUE(expected && found);
   EXPECT_NEAR(found->power_absolute_relative, expected->power_absolute_relative, 1e-9);
   EXPECT_EQ(found->verdict, expected->verdict);
@@ -79,29 +91,17 @@ TEST(Diagnose, CorrectsUnitShownByPower) {
 // With a factor that gyro and power confirm, recordings are diagnosed as without it; impossible readings are
 // as if they had not been measured.
 TEST(Diagnose, UsesConfirmedFactor) {
-  const made::Robot robot = made::virtual_robot("amr", 21, [](virtual_robot::SimulationSpec& spec) {
-    spec.sensors.motor_channels = false;
-    spec.missions = 3;
+  const auto [expected, found] = with_wheels_counted_twice([](signals::Sample& s, std::size_t k, bool twice) {
+    if (k % 50 > 2) return;
+    s.battery_voltage_v = twice ? 65.535 : signals::unmeasured;
+    s.battery_current_a = twice ? -0.01 : signals::unmeasured;
   });
-  telemetry::RecordingSet twice = robot.recordings, sound = robot.recordings;
-  for (telemetry::RecordingSet* set : {&twice, &sound})
-    for (telemetry::Recording& mission : set->missions)
-      for (std::size_t k = 0; k < mission.samples.size(); ++k) {
-        signals::Sample& s = mission.samples[k];
-        const bool twice_counted = set == &twice;
-        for (double& w : s.wheel_velocity_rad_s) w *= twice_counted ? 2 : 1;
-        if (k % 50 > 2) continue;
-        s.battery_voltage_v = twice_counted ? 65.535 : signals::unmeasured;
-        s.battery_current_a = twice_counted ? -0.01 : signals::unmeasured;
-      }
-  const auto expected = diagnose(sound, robot.model, {});
-  const auto found = diagnose(twice, robot.model, {});
   ASSERT_TRUE(expected && found);
   EXPECT_NEAR(found->power_absolute_relative, expected->power_absolute_relative, 1e-9);
   EXPECT_EQ(found->verdict, expected->verdict);
-  const auto check = [&](std::string_view id) {
-    const auto at = std::ranges::find(found->checks, id, &Check::id);
-    return at == found->checks.end() ? nullptr : &*at;
+  const auto check = [&checks = found->checks](std::string_view id) {
+    const auto at = std::ranges::find(checks, id, &Check::id);
+    return at == checks.end() ? nullptr : &*at;
   };
   ASSERT_TRUE(check("wheel_velocity_scale") && check("impossible_readings"));
   EXPECT_NEAR(check("wheel_velocity_scale")->value, 2, 0.01);  // as measured; 2 is divided out
