@@ -78,7 +78,8 @@ double VirtualRobot::sample_time_s(std::int64_t index) {
 void VirtualRobot::start_mission() {
   ++missions_begun_;
   under_way_ = true;
-  if (spec_.charger.below <= 0 && pack_.state_of_charge() < exchange_below) pack_.exchange();
+  if (missions_begun_ > 1 && spec_.charger.below <= 0 && pack_.state_of_charge() < exchange_below)
+    pack_.exchange();
   MissionScatter scatter;
   const auto factor = [&](double deviation) { return 1 + spec_.scatter * deviation * scatter_rng_.normal(); };
   const double common = factor(scatter_friction);

@@ -140,6 +140,14 @@ TEST(VirtualRobot, NominalPlantMatchesRobotFile) {
   }
 }
 
+TEST(VirtualRobot, BeginsWithTheGivenCharge) {
+  SimulationSpec spec = noisy_spec("amr");
+  spec.initial_charge = 0.1;
+  const Simulation run = simulate_missions(spec, 3);
+  EXPECT_EQ(run.truth.missions[0].charge_at_start, 0.1);
+  EXPECT_GT(run.truth.missions[1].charge_at_start, 0.25);  // exchanged between missions
+}
+
 TEST(VirtualRobot, PickupsChangeDeclaredPayload) {
   SimulationSpec spec = noisy_spec("amr", 4);
   spec.script.pickup_share = 1;
