@@ -89,6 +89,8 @@ void print_one(const Json& a, const std::string& unit) {
   if (const double sd = number_at(a, "state_of_charge_sd"); sd > 0) fmt::print(" ± {}", percent(sd));
   fmt::print(", reserve {}, {} {} above the reserve\n", percent(number_at(a, "reserve_fraction")),
              energy_text(number_at(a, "usable_energy_j"), unit), unit);
+  if (const Json& limitation = member_at(a, "state_of_charge_limitation"); limitation.is_string())
+    fmt::print("{}\n", text_of(limitation));
   const double to_full_s = number_at(a, "time_to_charged_s");
   if (a["charging"].is_string() && a["charging"] == "full") {
     fmt::print("At the charger: full.\n");

@@ -83,6 +83,9 @@ const Table<ingest::ChargeView>& charge_table() {
               "flat_curve", [](const V& v) { return v.estimate.flat_curve; },
               "true: the voltage is nearly independent of the charge here, so that the charge is estimated "
               "from the current only")
+          .text_or_null(
+              "limitation", [](const V& v) { return battery::limitation_of(v.estimate); },
+              "why the standard deviation of the charge is large, as a sentence; null: no such reason")
           .number_or_null(
               "current_bias_a",
               [](const V& v) {
@@ -259,6 +262,7 @@ answers::LiveRobot live_robot(const ingest::RobotSnapshot* snapshot) {
   if (snapshot == nullptr) return now;
   now.state_of_charge = snapshot->state_of_charge;
   now.state_of_charge_sd = snapshot->charge.estimate.sd;
+  now.charge_limitation = battery::limitation_of(snapshot->charge.estimate);
   now.charging = snapshot->charge.phase;
   now.to_full = snapshot->charge.to_full;
   now.speed_m_s = snapshot->speed_m_s;

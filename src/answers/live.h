@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <optional>
+#include <string>
 
 #include "battery/charging.h"
 #include "planning/path.h"
@@ -14,6 +15,7 @@ struct LiveRobot {
   std::optional<double> payload_kg;
   double state_of_charge = std::numeric_limits<double>::quiet_NaN();
   double state_of_charge_sd = std::numeric_limits<double>::quiet_NaN();
+  std::string charge_limitation;  // battery::limitation_of
   battery::ChargingPhase charging = battery::ChargingPhase::none;
   battery::ChargingTime to_full;  // until the charger's end; away from it, if the robot went there now
   double battery_voltage_v = std::numeric_limits<double>::quiet_NaN();

@@ -18,6 +18,15 @@ std::string_view name(ChargeSource source) {
   return names[static_cast<std::size_t>(source)];
 }
 
+std::string limitation_of(const ChargeEstimate& estimate) {
+  if (estimate.source == ChargeSource::unknown) return {};
+  if (estimate.default_curve)
+    return "The robot file has no battery.open_circuit_voltage: a typical curve is used.";
+  return estimate.flat_curve ? "The battery's voltage barely depends on the charge here: it is counted from "
+                               "the current."
+                             : "";
+}
+
 ChargeTracker::ChargeTracker(const robot::Battery& battery, double idle_power_w,
                              const ChargeTrackerSettings& settings, const ChargeTrust& trust)
     : filter_(battery, trust),

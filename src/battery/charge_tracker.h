@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "battery/charge_filter.h"
@@ -31,6 +32,9 @@ struct ChargeEstimate {
   double current_bias_a = 0;
   double current_bias_sd_a = std::numeric_limits<double>::quiet_NaN();
 };
+
+// Why the voltage determines the charge poorly, as a sentence; empty where it does not.
+std::string limitation_of(const ChargeEstimate& estimate);
 
 struct ChargeTrackerSettings {
   double update_s = 1;    // readings are averaged over this

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -111,6 +112,21 @@ TEST_F(AutonomyAnswer, FindsFastestDrivingWithinReserve) {
   EXPECT_TRUE(at(least - 1e-3, 0, true)["fastest"].is_null());
   EXPECT_NEAR(at(most + 1e-3, 0, true)["fastest"]["value_of_time_w"], 1e6, 1);
   EXPECT_TRUE(ask({{"tasks", tasks}})["fastest"].is_null());
+}
+
+TEST_F(AutonomyAnswer, StatesWhyChargeIsUncertain) {
+  live_.charge.estimate.source = battery::ChargeSource::voltage_and_current;
+  const auto limitation = [&](const json& request) {
+    const json stated = ask(request)["state_of_charge_limitation"];
+    return stated.is_null() ? "" : stated.get<std::string>();
+  };
+  EXPECT_EQ(limitation(json::object()), "");
+  live_.charge.estimate.flat_curve = true;
+  EXPECT_THAT(limitation(json::object()), ::testing::HasSubstr("counted from the current"));
+  live_.charge.estimate.default_curve = true;
+  EXPECT_THAT(limitation(json::object()), ::testing::HasSubstr("battery.open_circuit_voltage"));
+  EXPECT_EQ(limitation({{"state_of_charge", 0.5}}), "");
+  EXPECT_THAT(api::state_table().text({live_, {}, 1}), ::testing::HasSubstr("battery.open_circuit_voltage"));
 }
 
 // The robot's state and its energy state on LCM contain this answer, not another one.

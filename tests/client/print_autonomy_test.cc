@@ -28,6 +28,9 @@ TEST(PrintAutonomy, ExplainsUnreachablePace) {
     return ::testing::internal::GetCapturedStdout();
   };
   EXPECT_THAT(printed(), ::testing::Not(::testing::HasSubstr("cannot drive")));
+  EXPECT_THAT(printed(), ::testing::Not(::testing::HasSubstr("A typical curve")));
+  answer["state_of_charge_limitation"] = "A typical curve is used.";
+  EXPECT_THAT(printed(), ::testing::HasSubstr("\nA typical curve is used.\n"));
   answer["pace"]["limitation"] = "With 0 kg the robot cannot drive.";
   EXPECT_THAT(printed(), ::testing::HasSubstr("\nWith 0 kg the robot cannot drive.\n"));
 }

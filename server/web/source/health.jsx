@@ -94,7 +94,10 @@ export function chargeNote({ charging, charge, state_of_charge_sd: sd }) {
   const left = format.known(leftS) ? `, ${format.about(leftS)}` : '';
   if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, charging has ended' };
   if (charging) return { text: `charging${left}`, what: `At its charger${left}` };
-  return { text: format.known(sd) ? `± ${format.share(sd)}` : '', what: 'standard deviation' };
+  return {
+    text: format.known(sd) ? `± ${format.share(sd)}` : '',
+    what: charge.limitation ?? 'standard deviation',
+  };
 }
 
 export function Charge({ state }) {

@@ -314,7 +314,7 @@ struct AutonomyAnswer {
   const RobotOutlook& robot;
   const LiveRobot& now;
 
-  // For the phase of charging and the time until the battery would be charged.
+  // For what is known of the live charge only.
   LiveRobot charging() const { return output.charge_is_live ? now : LiveRobot{}; }
   const forecast::Pace& pace() const {
     const bool reached = output.limitation && request.input.driving != Driving::minimum_energy;
@@ -451,6 +451,10 @@ const Table<AutonomyAnswer>& autonomy_table() {
           .number_or_null(
               "state_of_charge_sd", [](const A& a) { return a.output.charge.deviation; },
               "standard deviation; 0 if not available")
+          .text_or_null(
+              "state_of_charge_limitation", [](const A& a) { return a.charging().charge_limitation; },
+              "why the standard deviation is large, as a sentence; null: no such reason, or the request "
+              "states the charge")
           .value(
               "reserve_fraction", [](const A& a) { return a.output.charge.reserve; },
               "reserved share of the charge")

@@ -95,7 +95,8 @@ export function PlanVerdict({ answer, autonomy }) {
       <p class="note">
         Starts with {percent(a.state_of_charge)}
         {sd} charge, {format.text(energy(a.usable_energy_j))} usable
-        {times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}.
+        {times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}.{' '}
+        {a.state_of_charge_limitation}
       </p>
       <Explanation answer={answer} autonomy={a} planned={a.minimum_energy} />
     </div>

@@ -103,7 +103,12 @@ function Now({ entry }) {
       ),
     ],
   ];
-  return <Readouts large rows={rows} />;
+  return (
+    <>
+      <Readouts large rows={rows} />
+      {s.charge.limitation && <p class="note foot">Charge: {s.charge.limitation}</p>}
+    </>
+  );
 }
 
 function SilenceNote({ state }) {
