@@ -56,7 +56,7 @@ void print_state(const Json& s, const std::string& unit) {
                    number_of(s, "battery_current_a", 2)));
   if (const Json& limitation = member_at(s, "charge/limitation"); limitation.is_string())
     line("", text_of(limitation));
-  line("range", fmt::format("{} km ({} in 19 of 20 cases), {} h", number_of(s, "range_m", 2, 1e-3),
+  line("range", fmt::format("{} km (at least {} in 19 of 20 cases), {} h", number_of(s, "range_m", 2, 1e-3),
                             number_of(s, "range_quantiles_m/p05", 2, 1e-3),
                             number_of(s, "run_time_s", 1, 1.0 / 3600)));
   if (s["mission"].is_object())
