@@ -80,7 +80,9 @@ void print_checks(const Json& d) {
 }
 
 void print_gap(const Json& d) {
-  if (d["power"] == gap::name_of(gap::PowerSource::none)) {
+  if (d["power"] == gap::name_of(gap::PowerSource::none) && member_at(d, "channels").empty()) {
+    fmt::print("gap: not available without power\n");
+  } else if (d["power"] == gap::name_of(gap::PowerSource::none)) {
     fmt::print("gap: no power was recorded; diagnosed from {}\n",
                d["motor_channels"] == true ? "torques" : "voltages and motion");
   } else if (member_at(d, "gap/energy_relative").is_null()) {

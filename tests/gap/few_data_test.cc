@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +12,9 @@
 
 namespace joulecast::gap {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 robot::RobotModel shipped() {
   return *robot::parse_robot(virtual_robot::shipped_robots()[0].json_text);
@@ -57,6 +61,21 @@ TEST(FewData, NamesNothingWithoutElectricalReadings) {
   EXPECT_EQ(d->verdict, Verdict::inconclusive);
   EXPECT_TRUE(d->effects.empty());
   EXPECT_FALSE(d->motor_channels);
+  EXPECT_TRUE(d->next_drive.empty());
+  EXPECT_THAT(d->reasons, ElementsAre(HasSubstr("needs battery_voltage with battery_current")));
+}
+
+TEST(FewData, NamesReadingsOfAnotherPack) {
+  telemetry::Recording r = rolling(60, true);
+  for (auto& s : r.samples) s.battery_voltage_v = 65.535;
+  const auto set = telemetry::make_recording_set("r", {r});
+  ASSERT_TRUE(set);
+  const auto d = diagnose_shipped(*set);
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->verdict, Verdict::inconclusive);
+  EXPECT_TRUE(d->next_drive.empty());
+  EXPECT_THAT(d->reasons,
+              ElementsAre(HasSubstr("without the readings of battery_voltage, which the checks")));
 }
 
 TEST(FewData, RejectsShortMission) {

@@ -111,6 +111,11 @@ TEST(VerdictText, ReportsReasonsWithoutEffects) {
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("data are insufficient")));
   d.power = PowerSource::none;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("No power was recorded")));
+  d.motor_channels = false;
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("needs battery_voltage with battery_current")));
+  d.checks = {{"impossible_readings", "battery_voltage", 601, {}, "", false},
+              {"wheel_velocity_scale", "wheel_velocity", 2, {}, "", true}};
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("without the readings of battery_voltage, which")));
 }
 
 TEST(VerdictText, NamesBetterBaseline) {

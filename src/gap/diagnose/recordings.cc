@@ -44,8 +44,10 @@ void state_correction(Check& check) {
 class Diagnoser {
  public:
   Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-            const Progress& progress)
-      : recordings_(recordings), robot_(robot), progress_(progress) {}
+            const Progress& progress, std::vector<Check> checks)
+      : recordings_(recordings), robot_(robot), progress_(progress) {
+    d_.checks = std::move(checks);
+  }
 
   Result<Diagnosis> run() {
     d_.robot_id = recordings_.robot_id;
@@ -61,9 +63,8 @@ class Diagnoser {
         telemetry::RecordingSet others = recordings_;
         silence_contradicted(others, std::array{*check});
         state_correction(*check);
-        Result<Diagnosis> d = Diagnoser(others, robot_, progress_).run();
-        if (d) d->checks.insert(d->checks.begin(), std::move(*check));
-        return d;
+        d_.checks.push_back(std::move(*check));
+        return Diagnoser(others, robot_, progress_, std::move(d_.checks)).run();
       }
     }
     const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
@@ -123,7 +124,8 @@ class Diagnoser {
 
   Diagnosis nothing_to_judge() {
     d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
-    d_.next_drive = first_drives(robot_);
+    // Without power another drive with the same channels is of no use.
+    if (!d_.motion_known || d_.power != PowerSource::none) d_.next_drive = first_drives(robot_);
     d_.refusal = "nothing was found that a robot file could take";
     d_.reasons = reasons_for(d_, false);
     return std::move(d_);
@@ -383,7 +385,7 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   // Where a sensor or the robot changed between missions, each side is diagnosed separately: the later one is
   // current.
   const auto sides = split_at_step(trusted, checks);
-  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, progress).run();
+  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, progress, checks).run();
   if (!d) return d;
   double corrected = 1;  // probability of the corrections, on which those of causes depend
   for (const Check& check : checks)
@@ -392,10 +394,9 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   d->outside.probability *= corrected;
   for (DiagnosedEffect& e : d->effects) e.probability *= corrected, e.group *= corrected;
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
-  d->checks.insert(d->checks.begin(), checks.begin(), checks.end());
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
-    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, progress).run();
+    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, progress, {}).run();
     if (!earlier) return earlier;
     d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
   }

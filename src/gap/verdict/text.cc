@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "gap/verdict/words.h"
+#include "windows/track.h"
 
 namespace joulecast::gap {
 namespace {
@@ -58,16 +59,18 @@ class Reasons {
   std::vector<std::string> all(bool worse_than_regression) {
     if (!d_.motion_known) {
       say("the recordings have less usable motion of the wheels than the 20 s that a diagnosis needs: they "
-          "are shorter, or their checks exclude it");
+          "are shorter, their checks exclude it, or no wheel turns faster than {} rad/s",
+          windows::moving_rad_s);
       return said_;
     }
     const bool nothing = d_.effects.empty() && d_.verdict == Verdict::inconclusive;
     if (!std::isfinite(d_.power_absolute_relative) && nothing) {
-      if (d_.motor_channels && d_.power == PowerSource::none)
+      if (d_.power != PowerSource::none)
+        say("the data are insufficient: too few seconds of motion with power");
+      else if (d_.motor_channels)
         say("no power was recorded, and the torques alone do not determine the cause");
       else
-        say("the data are insufficient: too few seconds of motion, or neither power nor the motors' voltage "
-            "or current");
+        no_power();
       return said_;
     }
     if (d_.verdict == Verdict::none) return said_;
@@ -109,6 +112,21 @@ class Reasons {
   template <class... Args>
   void say(fmt::format_string<Args...> text, Args&&... args) {
     said_.push_back(sentence(fmt::format(text, std::forward<Args>(args)...)));
+  }
+
+  // Another drive with the same channels would be of no use: states what is missing.
+  void no_power() {
+    std::string excluded;
+    for (const Check& check : d_.checks)
+      if ((check.contradicted || check.id == "impossible_readings") && check.channel != "wheel_velocity")
+        excluded += (excluded.empty() ? "" : ", ") + check.channel;
+    if (excluded.empty())
+      say("neither power nor the motors' voltage or current was recorded: a diagnosis needs battery_voltage "
+          "with battery_current, or motor_voltage, or motor_current");
+    else
+      say("no power is left without the readings of {}, which the checks exclude: compare their unit and the "
+          "robot file with the robot",
+          excluded);
   }
 
   void shrinkage() {

@@ -232,7 +232,7 @@ function NextDrives({ result: r }) {
       <p class="note">
         {decided
           ? 'No further drive is needed.'
-          : 'No drive would determine the cause; the effects list what to check.'}
+          : `No drive would determine the cause${r.effects.length > 0 ? '; the effects list what to check' : ''}.`}
       </p>
     );
   return (
