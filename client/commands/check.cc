@@ -39,7 +39,7 @@ struct CheckOptions {
   bool json = false;
 };
 
-enum class Kind { robot, mapping, log, table };
+enum class Kind { robot, mapping, bag_mapping, log, table };
 
 // The checked objects and the results.
 struct Report {
@@ -68,7 +68,13 @@ Result<Kind> kind_of(const std::string& path) {
   if (text == first.end() || (*text != '{' && *text != '[')) return Kind::table;
   TRY_ASSIGN(const auto content, read_file(path));
   const Json document = Json::parse(content, nullptr, false);
-  return document.is_object() && document.contains("fields") ? Kind::mapping : Kind::robot;
+  const auto has_any = [&](std::initializer_list<const char*> members) {
+    return document.is_object() &&
+           std::ranges::any_of(members, [&](const char* name) { return document.contains(name); });
+  };
+  return has_any({"fields", "time", "covariates", "tables"})          ? Kind::mapping
+         : has_any({"topics", "joints", "battery_current", "hold_s"}) ? Kind::bag_mapping
+                                                                      : Kind::robot;
 }
 
 void check_model(const robot::RobotModel& model, const std::string& name, Report& report) {
@@ -113,6 +119,14 @@ Result<void> check_mapping(const std::string& path, Report& report) {
   return {};
 }
 
+Result<void> check_mapping_of_bags(const std::string& path, Report& report) {
+  report.add(path, "mapping of bags");
+  const auto checked = check_bag_mapping(path);
+  if (!checked && checked.error().fault != Fault::invalid) return checked;
+  if (!checked) report.findings.push_back({true, path, "", checked.error().message});
+  return {};
+}
+
 // Recordings of one robot against the robot file, as far as there is one.
 void check_recordings(Result<telemetry::RecordingSet> set, const std::string& name, Report& report) {
   if (!set)
@@ -125,7 +139,7 @@ void check_recordings(Result<telemetry::RecordingSet> set, const std::string& na
 void check_channels(bool live, Report& report) {
   for (const auto& [channel, tally] : report.watch.channels()) {
     judge(channel, tally, live, report.findings);
-    if (!report.robot) judge_fields(channel, tally, report.findings);
+    judge_fields(channel, tally, report.robot.has_value(), report.findings);
   }
 }
 
@@ -174,7 +188,9 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
     auto imports = import_table(table, mapping, how);
     report.add(table, "table");
     if (!imports) {
-      report.findings.push_back({true, table, imports.error().field, imports.error().message});
+      std::string place = imports.error().field;
+      if (place.starts_with(table + ": ")) place.erase(0, table.size() + 2);
+      report.findings.push_back({true, table, std::move(place), imports.error().message});
       continue;
     }
     for (telemetry::Import& import : *imports) {
@@ -239,6 +255,7 @@ Result<void> check_files(const CheckOptions& options, Report& report) {
     TRY_ASSIGN(const auto kind, kind_of(file));
     if (kind == Kind::robot) TRY(check_robot_file(file, report));
     if (kind == Kind::mapping) TRY(check_mapping(file, report));
+    if (kind == Kind::bag_mapping) TRY(check_mapping_of_bags(file, report));
     if (kind == Kind::log) logs.push_back(file);
     if (kind == Kind::table) tables.push_back(file);
   }
@@ -271,6 +288,8 @@ void print_check(const Report& report) {
   for (const auto& [channel, tally] : report.watch.channels())
     fmt::print("{:<32} {:>8} messages, {:.4g} a second\n", channel, tally.messages, tally.rate_hz());
   print(report.findings);
+  if (!report.robot && !report.watch.channels().empty())
+    fmt::print("units and signs are compared with a robot file only: --robot FILE\n");
 }
 
 Result<Exit> run_check(CheckOptions& options) {

@@ -9,9 +9,11 @@
 
 #include "client/commands/server_answer.h"
 #include "client/wrapped.h"
+#include "gap/diagnose/wheel_scale.h"
 #include "signals/gaps.h"
 #include "telemetry/impossible.h"
 #include "telemetry/slow_stream.h"
+#include "windows/track.h"
 
 namespace joulecast::client {
 namespace {
@@ -87,21 +89,29 @@ void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, F
   for (const plausibility::Check& check : plausibility::drop_impossible(recordings, robot))
     findings.push_back({check.value >= telemetry::mistaken_share * static_cast<double>(recordings.samples),
                         recordings.robot_id, check.channel, check.id + ": " + check.says, check.value});
-  for (const plausibility::Check& check : plausibility::check_recordings(recordings, robot))
+  std::vector<plausibility::Check> checks = plausibility::check_recordings(recordings, robot);
+  plausibility::silence_contradicted(recordings, checks);
+  if (auto scale = gap::wheel_scale_by_power(robot, recordings)) checks.push_back(std::move(*scale));
+  for (const plausibility::Check& check : checks)
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
   for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});
 }
 
-void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings) {
+void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, bool robot_file,
+                  Findings& findings) {
   if (tally.subject != telemetry::Subject::telemetry || tally.messages < 20) return;
-  const auto turns = [&](const telemetry::FieldTally& field) {
-    return field.name.starts_with("wheel_velocity") && field.changes > 0;
-  };
-  if (std::ranges::none_of(tally.fields, turns)) {
-    findings.push_back({false, channel, "wheel_velocity", "no wheel turned: nothing else can be checked"});
-    return;
-  }
+  double fastest = 0;
+  for (const telemetry::FieldTally& field : tally.fields)
+    if (field.name.starts_with("wheel_velocity") && field.changes > 0)
+      fastest = std::max({fastest, field.greatest, -field.least});
+  if (fastest <= windows::moving_rad_s)
+    findings.push_back({false, channel, "wheel_velocity",
+                        fmt::format("no wheel turned faster than {:.2g} rad/s: nothing else can be checked; "
+                                    "is its unit rad/s at the wheel?",
+                                    fastest),
+                        fastest});
+  if (robot_file || fastest <= windows::moving_rad_s) return;
   for (const telemetry::FieldTally& field : tally.fields) {
     const bool is_stated = field.name.starts_with("velocity_command") || field.name.starts_with("payload");
     if (is_stated || field.measured < 20 || field.changes > 0) continue;

@@ -32,8 +32,10 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
 // Of a robot's recordings against its file: signs, units, dead, held and constant channels.
 void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings);
 
-// For channels alone, without a robot file to compare with: those that never change though the robot moves.
-void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings);
+// For channels alone: wheels that never turn; and, without a robot file to compare with, fields that never
+// change though the robot moves.
+void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, bool robot_file,
+                  Findings& findings);
 
 // For a table as read: values that were dropped, filled, out of their limits or could not be joined.
 void judge(const telemetry::Import& import, const std::string& table, Findings& findings);

@@ -13,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -111,23 +110,37 @@ bool is_bag(const std::string& path) {
 }
 
 // The recordings of bags as tables in a folder, converted by deploy/import/bags.cjs.
-Result<std::vector<ImportSource>> convert_bags(const ImportOptions& options, const std::string& folder) {
-  TRY_ASSIGN(const auto script, converter());
-  const Json asked{{"bags", options.tables},
-                   {"out", folder},
-                   {"mapping", options.mapping},
-                   {"robot", options.robot},
-                   {"robot_id", options.robot_id}};
-  TRY(run_node(script, asked.dump()));
-  TRY_ASSIGN(const auto text, read_file(folder + "/answer.json"));
-  const Json answer = Json::parse(text);
-  if (answer.contains("message")) return invalid(answer.at("field"), answer.at("message"));
-  std::vector<ImportSource> sources;
-  for (const Json& one : answer.at("recordings"))
-    sources.push_back({one.at("source"), folder + "/" + one.at("table").get<std::string>(),
-                       folder + "/" + one.at("mapping").get<std::string>(), one.at("lines")});
-  return sources;
-}
+class ConvertedBags {
+ public:
+  ConvertedBags() { mkdtemp(folder_.data()); }
+  ConvertedBags(const ConvertedBags&) = delete;
+  ConvertedBags& operator=(const ConvertedBags&) = delete;
+  ~ConvertedBags() {
+    std::error_code left;
+    fs::remove_all(folder_, left);
+  }
+
+  Result<std::vector<ImportSource>> convert(const ImportOptions& options) {
+    TRY_ASSIGN(const auto script, converter());
+    const Json asked{{"bags", options.tables},
+                     {"out", folder_},
+                     {"mapping", options.mapping},
+                     {"robot", options.robot},
+                     {"robot_id", options.robot_id}};
+    TRY(run_node(script, asked.dump()));
+    TRY_ASSIGN(const auto text, read_file(folder_ + "/answer.json"));
+    const Json answer = Json::parse(text);
+    if (answer.contains("message")) return invalid(answer.at("field"), answer.at("message"));
+    std::vector<ImportSource> sources;
+    for (const Json& one : answer.at("recordings"))
+      sources.push_back({one.at("source"), folder_ + "/" + one.at("table").get<std::string>(),
+                         folder_ + "/" + one.at("mapping").get<std::string>(), one.at("lines")});
+    return sources;
+  }
+
+ private:
+  std::string folder_ = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
+};
 
 Result<std::vector<Imported>> import_all(const ImportOptions& options,
                                          const std::vector<ImportSource>& sources) {
@@ -231,16 +244,9 @@ Result<Exit> run_import(ImportOptions& options) {
   const auto bags = std::ranges::count_if(options.tables, is_bag);
   if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
     return invalid("table", "bags and tables are imported by separate commands");
-  std::string folder = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
-  const auto remove = [](const std::string* made) {
-    std::error_code left;
-    fs::remove_all(*made, left);
-  };
-  std::unique_ptr<std::string, decltype(remove)> converted(nullptr, remove);
+  std::optional<ConvertedBags> converted;
   if (bags > 0) {
-    if (mkdtemp(folder.data()) == nullptr) return unavailable(folder, errno);
-    converted.reset(&folder);
-    TRY_ASSIGN(sources, convert_bags(options, folder));
+    TRY_ASSIGN(sources, converted.emplace().convert(options));
   } else if (options.mapping.empty()) {
     return invalid("--mapping", "is required for tables: it assigns columns to channels (deploy/import)");
   } else if (!options.robot.empty()) {
@@ -274,6 +280,14 @@ Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
     error.field = path + (error.field.empty() ? "" : "#" + error.field);
     return error;
   });
+}
+
+Result<void> check_bag_mapping(const std::string& path) {
+  ImportOptions options;
+  options.mapping = path;
+  options.robot_id = "any";
+  TRY(ConvertedBags().convert(options));
+  return {};
 }
 
 Result<std::vector<telemetry::Import>> import_table(const std::string& path,

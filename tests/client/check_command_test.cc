@@ -1,4 +1,5 @@
 // Findings of `joulecast check` in files, and the exit codes that scripts rely on.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -107,6 +108,12 @@ TEST_F(CheckCommand, ReadsTableThroughMapping) {
   EXPECT_EQ(check({file("w.json", wrong.dump())}), Exit::fault);
   EXPECT_THAT(printed_, HasSubstr("/time/unit"));
 
+  // Without its fields it is no robot file either.
+  json bare = mapping;
+  bare.erase("fields");
+  EXPECT_EQ(check({file("b.json", bare.dump())}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("b.json: mapping"));
+
   wrong["robot_id"] = "a b";
   wrong["fields"]["speed"] = 1;
   EXPECT_EQ(check({file("v.json", wrong.dump()), "--json"}), Exit::fault);
@@ -114,6 +121,44 @@ TEST_F(CheckCommand, ReadsTableThroughMapping) {
   const json said = json::parse(printed_);
   for (const json& finding : said["findings"]) fields.push_back(finding["field"].get<std::string>());
   EXPECT_THAT(fields, ::testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
+}
+
+TEST_F(CheckCommand, NamesMultipliedCountsOfTables) {
+  made::Robot robot = made::virtual_robot("amr", 5, [](auto& spec) {
+    spec.sensors.motor_channels = false;
+    spec.missions = 1;
+  });
+  std::string csv = "t,r,l,v,i\n";
+  for (const signals::Sample& s : robot.recordings.missions[0].samples)
+    csv +=
+        fmt::format("{},{},{},{},{}\n", 1e-6 * static_cast<double>(s.utime_us), 4 * s.wheel_velocity_rad_s[0],
+                    4 * s.wheel_velocity_rad_s[1], s.battery_voltage_v, s.battery_current_a);
+  const std::string table = file("multiplied.csv", csv);
+  json mapping = {{"robot_id", "amr"},
+                  {"time", {{"column", "t"}, {"unit", "s"}}},
+                  {"fields",
+                   {{"wheel_velocity", {{{"column", "r"}}, {{"column", "l"}}}},
+                    {"battery_voltage", {{"column", "v"}}},
+                    {"battery_current", {{"column", "i"}}}}}};
+  const std::string how = file("m.json", mapping.dump()), amr = file("a.json", amr_.dump());
+  EXPECT_EQ(check({table, "--mapping", how}), Exit::ok);
+  EXPECT_THAT(printed_, HasSubstr("compared with a robot file only: --robot FILE"));
+  EXPECT_EQ(check({table, "--mapping", how, "--robot", amr}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("wheel_velocity looks 4 times the motion,"));
+  // Divided once too often.
+  for (json& side : mapping["fields"]["wheel_velocity"]) side["divide_by"] = 2673.8;
+  EXPECT_EQ(check({table, "--mapping", file("n.json", mapping.dump()), "--robot", amr}), Exit::warned);
+  EXPECT_THAT(printed_, HasSubstr("wheel_velocity: no wheel turned faster than 0.0"));
+}
+
+TEST_F(CheckCommand, NamesPlaceOfTableErrors) {
+  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
+  const std::string table = file("twice.csv", "t,r,l,t\n0,1,1,0\n");
+  EXPECT_EQ(check({table, "--mapping", how, "--json"}), Exit::fault);
+  const json finding = json::parse(printed_)["findings"].back();
+  EXPECT_EQ(finding["about"], table);
+  EXPECT_EQ(finding["field"], "line 1");
 }
 
 TEST_F(CheckCommand, ReportsRowsOutOfOrder) {

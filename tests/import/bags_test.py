@@ -359,6 +359,16 @@ class Bags(unittest.TestCase):
             mapping.write_text(json.dumps(wrong))
             self.assertIn(part, self.bring(path, "--mapping", mapping, code=2)[1])
 
+    def test_check_reads_mappings(self):
+        mapping = self.place / "mapping.json"
+        for members, code, part in (({"topics": {"battery": "/bms", "pose": None}, "robot_id": "amr"}, 0, "no problems found"),
+                                    ({"topics": {"wheel": "/a"}}, 1, "'wheel' is none of"), ({"joints": {}, "topic": {}}, 1, "'topic' is none of"),
+                                    ({"battery_current": "reversed"}, 1, "positive_discharging")):
+            mapping.write_text(json.dumps(members))
+            text = run(CLIENT, "check", mapping, code=code)
+            self.assertIn("mapping.json: mapping of bags", text)
+            self.assertIn(part, text)
+
     def test_sign_of_the_current(self):
         path, mapping = self.mcap(Drive(self.samples).wheels().battery(sign=1).rest()), self.place / "mapping.json"
         self.assertIn('by its sign the battery charges', self.bring(path)[1])

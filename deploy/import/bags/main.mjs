@@ -22,6 +22,7 @@ async function convert(request) {
   const robotId = request.robot_id || choices.robot_id || robot.robot_id;
   if (!robotId)
     return { field: '--robot', message: 'bags do not name the robot: give its file, or --robot-id' };
+  new Recording(choices, robot); // its mistakes, without a bag too
   const recordings = [];
   let open; // files of one recording follow each other
   let source;
@@ -46,7 +47,7 @@ async function convert(request) {
       if (open) await close();
       [open, source] = [recording, bag];
     }
-    await close();
+    if (open) await close();
   } catch (error) {
     return { field: error.option ?? at, message: error.message };
   }

@@ -91,4 +91,15 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
   return check;
 }
 
+std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
+                                          const telemetry::RecordingSet& recordings) {
+  const windows::Readings readings = windows::find_readings(recordings.missions);
+  if (!from_motion_of(readings).power) return std::nullopt;
+  std::vector<Window> all = windows::make_windows(recordings.missions, robot, readings);
+  keep_known_motion(all);
+  const auto in_file = dynamics::active_effects(robot);
+  return in_file ? wheel_scale_by_power(robot, *in_file, all, measured_power(all, robot, false))
+                 : std::nullopt;
+}
+
 }  // namespace joulecast::gap

@@ -5,6 +5,7 @@
 
 #include "gap/equations/channels.h"
 #include "gap/verdict/diagnosis.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
 
@@ -14,5 +15,9 @@ namespace joulecast::gap {
 std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
                                           std::span<const dynamics::ActiveEffect> in_file,
                                           std::span<const Window> windows, std::span<const double> power_w);
+
+// The same of recordings, before any diagnosis.
+std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
+                                          const telemetry::RecordingSet& recordings);
 
 }  // namespace joulecast::gap
