@@ -168,9 +168,9 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
     const auto found = places(tried);
     if (found.size() == 1) return CellPlace{found[0]};
     if (found.size() > 1)
-      return fail(
-          Fault::invalid, here,
-          fmt::format("{} columns are called '{}': '{}#1' is the first of them", found.size(), tried, tried));
+      return fail(Fault::invalid, here,
+                  fmt::format("columns {} and {} are called '{}': the mapping names them '{}#1' and '{}#2'",
+                              found[0] + 1, found[1] + 1, tried, tried, tried));
   }
   static const RE2 numbered(R"((.+)#(\d{1,9}))"), listed(R"((.+)\[(\d{1,9})\])");
   std::string named;

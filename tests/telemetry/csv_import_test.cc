@@ -742,7 +742,7 @@ TEST(ImportLayout, JoinedFilesKeepTheirMarks) {
 TEST(ImportLayout, EqualNamesNeedNumber) {
   const std::string csv = "t,r,l,v,t\n0,1,1,25,10\n1,1,1,25,11\n";
   EXPECT_THAT(read_table(csv, in_seconds).error().message,
-              HasSubstr("2 columns are called 't': 't#1' is the first"));
+              HasSubstr("columns 1 and 5 are called 't': the mapping names them 't#1' and 't#2'"));
   const auto second = read_table(csv, R"("column": "t#2", "unit": "s")");
   EXPECT_EQ((*second)[0].recording.samples[0].utime_us, 10'000'000);
   EXPECT_THAT(read_table(csv, R"("column": "t#3", "unit": "s")").error().message,
