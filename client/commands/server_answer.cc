@@ -71,6 +71,9 @@ Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::s
   auto reply = http_request(address, method, target, body, timeout, accept);
   if (!reply || reply->ok()) return reply;
   Error error = error_of(*reply);
+  if (reply->status == 404 && (error.field.empty() || error.field == "path"))
+    return fail(Fault::not_found, "--server",
+                server + " is no joulecastd, or one of another version (the server answered 404)");
   const auto by_name = std::ranges::find(renamed, error.field, &Renamed::value_type::first);
   if (by_name != renamed.end()) error.field = by_name->second;
   // Messages contain names of times too.

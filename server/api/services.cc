@@ -71,7 +71,7 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
   if (services.fleet.find(robot_id) == nullptr)
     return tl::unexpected(ingest::unknown_robot(std::move(field), robot_id));
   return fail(Fault::not_found, std::move(field),
-              "robot " + robot_id + " publishes telemetry but has no model yet: PUT /v1/robots/" + robot_id);
+              "robot " + robot_id + " publishes telemetry but has no robot file yet");
 }
 
 described::Schemas schemas() {

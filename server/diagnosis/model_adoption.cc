@@ -164,7 +164,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
   if (before == nullptr)
     return fail(Fault::not_found, "id",
-                "robot " + robot_id + " has no model to test a new one against: PUT /v1/robots/" + robot_id);
+                "robot " + robot_id + " has no model to test a new one against: add its robot file");
   if (request.expected_version && *request.expected_version != before->version)
     return fail(Fault::conflict, "/expected_version",
                 "version " + std::to_string(before->version) + " is in force, not " +

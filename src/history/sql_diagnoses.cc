@@ -11,11 +11,11 @@ namespace joulecast::history {
 namespace {
 
 tl::unexpected<Error> no_diagnosis(std::int64_t id) {
-  return fail(Fault::not_found, "diagnosis", "no diagnosis has id " + std::to_string(id));
+  return fail(Fault::not_found, "diagnosis_id", "no diagnosis has id " + std::to_string(id));
 }
 
 tl::unexpected<Error> no_proposal(std::int64_t id) {
-  return fail(Fault::not_found, "proposal", "no proposal has id " + std::to_string(id));
+  return fail(Fault::not_found, "proposal_id", "no proposal has id " + std::to_string(id));
 }
 
 template <class T>

@@ -6,8 +6,7 @@
 namespace joulecast::ingest {
 
 Error unknown_robot(std::string field, std::string_view robot_id) {
-  return {Fault::not_found, std::move(field),
-          "no robot is called '" + std::string(robot_id) + "'; GET /v1/robots lists the robots"};
+  return {Fault::not_found, std::move(field), "no robot is called '" + std::string(robot_id) + "'"};
 }
 
 Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {

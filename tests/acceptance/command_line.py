@@ -45,7 +45,7 @@ def read_history(options, programs):
     check(fleet.splitlines()[1].startswith("amr ") and "charge %" in fleet, fleet)
     check(json.loads(programs.run("robots", *server, "--json"))["robots"][0]["robot_id"] == "amr", fleet)
     state = programs.run("state", *server, "--robot-id", "amr")
-    check(state.startswith("amr: silent for ") and "  charge " in state and "in 19 of 20 cases" in state, state)
+    check(state.startswith("amr: silent for ") and "  charge " in state and "km (at least " in state and "in 19 of 20 cases" in state, state)
     check(programs.run("state", "amr", *server).startswith("amr: silent for "), "a robot as argument")
     ledger = programs.run("ledger", "1", "--unit", "J", *server)
     parts = [float(line.split()[1]) for line in ledger.splitlines()[1:]]
@@ -175,10 +175,19 @@ def main():
                         ("profile --deadline 1", "--deadline"), ("missions --limit many", "--limit")):
         check(f"joulecast: {flag}: " in messages[request], f"{request}: {messages[request]}")
         check(messages[request].count("joulecast: ") == messages[request].count(f"joulecast: {flag}: "), f"{request}: {messages[request]}")
-    wording = "no robot is called 'nobody'; GET /v1/robots lists the robots"
+    wording = "no robot is called 'nobody'"
     for command in (["profile", "--length", "8"], ["autonomy", "--charge", "0.5"], ["gap"]):
         done = subprocess.run([options.client, *command, "--server", programs.url, "--robot-id", "nobody"], capture_output=True, text=True)
         check(done.returncode == 1 and f"joulecast: --robot-id: {wording}" in done.stderr, f"{command}: {done.stderr}")
+    # What does not exist is named as the command names it.
+    for command, message in ((["adopt", "amr", "--proposal", "99"], "--proposal: no proposal has id 99"),
+                             (["adopt", "amr", "--diagnosis", "99"], "--diagnosis: no diagnosis has id 99"),
+                             (["ledger", "99999"], "mission: no mission has key 99999")):
+        done = subprocess.run([options.client, *command, "--server", programs.url], capture_output=True, text=True)
+        check(done.returncode == 1 and f"joulecast: {message} (" in done.stderr, f"{command}: {done.stderr}")
+    for command in (["robots"], ["state", "amr"], ["ledger", "1"], ["autonomy", "amr"], ["gap", "amr"], ["adopt", "amr", "--version", "1"]):
+        done = subprocess.run([options.client, *command, "--server", programs.url + "/nowhere"], capture_output=True, text=True)
+        check(done.returncode == 1 and f"joulecast: --server: {programs.url}/nowhere is no joulecastd" in done.stderr, f"{command}: {done.stderr}")
     # The daemon exits with 2 for a wrong command line and with 1 if it cannot start; it always names the setting.
     for code, name, setting in ((2, "--http-port", "99999"), (1, "store.path", "/no/such/folder/store.db")):
         flag = name if name.startswith("--") else "--store-path"

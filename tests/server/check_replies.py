@@ -557,7 +557,7 @@ def exercise(checker, source):
     if (empty or {}).get("field") != "/tasks/0/path":
         checker.fault(f"an empty task: {empty}")
     # The message for an unknown robot is the same everywhere.
-    wording = "no robot is called 'no-such-robot'; GET /v1/robots lists the robots"
+    wording = "no robot is called 'no-such-robot'"
     requests = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/models",
                                                                             "/v1/robots/{id}/proposals", "/v1/robots/{id}/gap-history")]
     requests += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
