@@ -63,15 +63,29 @@ void order(std::vector<AttentionReason>& reasons) {
   });
 }
 
+// What to do about a contradiction that no corrected value of its channel ends.
+constexpr std::pair<std::string_view, std::string_view> other_actions[] = {
+    {"sequence_skipping", "Check the robot's network, and that it publishes every message that it counts."},
+    {"second_sender", "Give each robot its own robot_id."},
+    {"utime_slow", "Publish the robot's telemetry more often."},
+    {"clock_ahead", "Set the robot's clock."},
+    {"clock_far_ahead", "Set the robot's clock."},
+    {"undecodable", "Build the robot's publisher with the message types of lcmtypes."}};
+
+std::string action_for(const ingest::Contradiction& c) {
+  using Action = std::pair<std::string_view, std::string_view>;
+  const auto* other = std::ranges::find(other_actions, c.id, &Action::first);
+  std::string action = other != std::end(other_actions) ? std::string(other->second)
+                       : c.channel.empty()              ? "Correct the robot's telemetry."
+                                           : "Correct " + c.channel + " in the robot's telemetry.";
+  return c.untrue ? action + " Until then its missions are not used for training." : action;
+}
+
 void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSnapshot& s,
                    const ingest::ModelInForce* model, std::int64_t now_utime_us) {
-  for (const ingest::Contradiction& c : s.contradictions) {
-    std::string action = c.channel.empty() ? "Correct the robot's telemetry."
-                                           : "Correct " + c.channel + " in the robot's telemetry.";
-    if (c.untrue) action.append(" Until then its missions are not used for training.");
-    reasons.push_back({"contradicted", Severity::fault, c.told_utime_us, c.says, std::move(action),
-                       c.id + ' ' + c.channel});
-  }
+  for (const ingest::Contradiction& c : s.contradictions)
+    reasons.push_back(
+        {"contradicted", Severity::fault, c.told_utime_us, c.says, action_for(c), c.id + ' ' + c.channel});
   const bool live = is_live(s, now_utime_us);
   if (!live && s.received_utime_us > 0 && !s.mission_id.empty())
     reasons.push_back({"silent", Severity::fault, s.received_utime_us,
@@ -83,7 +97,7 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
                        Severity::warning,
                        {},
                        "Telemetry of a robot without a robot file is not recorded.",
-                       "Add its robot file: PUT /v1/robots/" + s.robot_id + "."});
+                       "Add its robot file."});
   if (live && model != nullptr && !battery::at_charger(s.charge.phase) &&
       s.state_of_charge < model->robot.battery.reserve_fraction)  // false for NaN
     reasons.push_back({"charge_low",

@@ -61,7 +61,7 @@ def main():
         return listed()[robot_id][kind]
 
     try:
-        for robot_id, change in (("healthy", {}), ("slow", {"limits": {**fleet.kind["limits"], "speed_m_s": 0.05}}), ("lost", {}),
+        for robot_id, change in (("healthy", {}), ("slow", {"limits": {**fleet.kind["limits"], "speed_m_s": 0.05}}), ("lost", {}), ("lossy", {}),
                                  ("empty", {"battery": {**fleet.kind["battery"], "reserve_fraction": 0.95}})):
             with open(fleet.file(robot_id, **change), encoding="utf-8") as file:
                 programs.put(f"/v1/robots/{robot_id}", json.load(file))
@@ -70,7 +70,11 @@ def main():
         fleet.drive("empty")
         lost = fleet.drive("lost")
         fleet.drive("stranger")
+        lossy = fleet.drive("lossy", "--loss", "0.5")
 
+        check("Check the robot's network" in wait_for("lossy", "contradicted")["action"], "what to do about lost samples")
+        lossy.kill()
+        check(ask(programs.url, "DELETE", "/v1/robots/lossy?history=purge", None)[0] == 200, "a robot is removed")
         check("reserve of 95 %" in wait_for("empty", "charge_low")["message"], "the reserve in the message")
         check("robot file" in wait_for("stranger", "no_robot_file")["message"], "no robot file")
         check(wait_for("slow", "contradicted")["severity"] == "fault", "a speed above the file's limit is a fault")
