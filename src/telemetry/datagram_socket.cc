@@ -242,8 +242,10 @@ Result<DatagramSocket> DatagramSocket::open(const UdpmUrl& url, const std::strin
     return failed("lcm.url", "cannot bind to the group");
   if (!state->set(IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) {
     return failed(interface_address.empty() ? "lcm.url" : "lcm.bind_address",
-                  "cannot join the group" + (interface_address.empty() ? " (is there a route to it?)"
-                                                                       : " on " + interface_address));
+                  "cannot join the group" +
+                      (interface_address.empty()
+                           ? " (is there a route to it, as `ip route add 224.0.0.0/4 dev lo` adds?)"
+                           : " on " + interface_address));
   }
   return DatagramSocket(std::move(state));
 }

@@ -87,7 +87,13 @@ Result<LcmLink> LcmLink::open(const std::string& provider_url) {
   state->wake_fd = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (state->wake_fd < 0) return fail(Fault::unavailable, "lcm", std::strerror(errno));
   state->lcm.reset(lcm_create(provider_url.c_str()));
-  if (!state->lcm) return fail(Fault::unavailable, "lcm.url", "cannot open the provider " + provider_url);
+  if (!state->lcm)
+    return fail(
+        Fault::unavailable, "lcm.url",
+        "cannot open the provider " + provider_url +
+            (state->udpm ? "; multicast needs a route, on a computer without a network: `ip link set lo "
+                           "multicast on && ip route add 224.0.0.0/4 dev lo`"
+                         : ""));
   return LcmLink(std::move(state));
 }
 

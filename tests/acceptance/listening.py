@@ -64,11 +64,20 @@ def names_end_of_another_mission(options, programs, robot):
     check(programs.stop() == 0, "the daemon did not stop in order")
 
 
+def states_missing_route(options):
+    """A network namespace has the loopback interface alone, and no route."""
+    if subprocess.run(["unshare", "--net", "true"], capture_output=True).returncode != 0:
+        return
+    told = subprocess.run(["unshare", "--net", options.client, "spy", "--seconds", "0.5"], capture_output=True, text=True)
+    check(told.returncode == 3 and "`ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo`" in told.stderr, f"spy without a route: {told}")
+
+
 def main():
     options = arguments()
     need_multicast()
     programs = Programs(options)
     hears_other_channels(options, programs)
+    states_missing_route(options)
     names_end_of_another_mission(options, programs, f"{options.source}/deploy/robots/amr.json")
 
 
