@@ -25,7 +25,9 @@ export function Bars({ rows, label, head, class: name = '' }) {
         <thead class="hidden">
           <tr>
             {head.map((title) => (
-              <th key={title}>{title}</th>
+              <th key={title} scope="col">
+                {title}
+              </th>
             ))}
           </tr>
         </thead>

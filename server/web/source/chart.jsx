@@ -2,7 +2,7 @@
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { energyUnit } from './energy.js';
 import { palette, useTheme } from './theme.js';
-import { clock, fixed, time } from './format.js';
+import { fixed, time } from './format.js';
 
 const narrow = '"Liberation Sans Narrow", "Arial Narrow", "Helvetica Neue", Arial, sans-serif';
 
@@ -37,16 +37,11 @@ const minute = 60;
 const hours = 3600;
 const day = 86_400;
 export const clockSteps = [
-  1,
-  2,
-  5,
-  10,
-  15,
-  30,
-  ...[1, 2, 5, 10, 15, 30].map((m) => m * minute),
-  ...[1, 2, 3, 6, 12].map((h) => h * hours),
-  ...[1, 2, 7, 14, 28, 91, 182, 364, 728, 1820].map((d) => d * day),
-];
+  [1, [1, 2, 5, 10, 15, 30]],
+  [minute, [1, 2, 5, 10, 15, 30]],
+  [hours, [1, 2, 3, 6, 12]],
+  [day, [1, 2, 7, 14, 28, 91, 182, 364, 728, 1820]],
+].flatMap(([unit, counts]) => counts.map((k) => k * unit));
 
 // Local times, with the day where it changes.
 export const clockAxis = { incrs: clockSteps, splits: clockSplits, values: clockValues };
@@ -61,10 +56,8 @@ function clockSplits(_, index, low, high, step) {
 function clockValues(_, splits, index, space, step) {
   let day = '';
   return splits.map((second) => {
-    const d = new Date(second * 1000);
-    const today = `${d.getMonth() + 1}-${String(d.getDate()).padStart(2, '0')}`;
-    const hour = clock(second * 1e6).slice(0, step < 60 ? 8 : 5);
-    const text = today === day ? hour : `${hour}\n${d.getFullYear()}-${today.padStart(5, '0')}`;
+    const [today, hour] = time(second * 1e6).split(' ');
+    const text = `${hour.slice(0, step < 60 ? 8 : 5)}${today === day ? '' : `\n${today}`}`;
     day = today;
     return text;
   });

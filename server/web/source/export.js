@@ -1,5 +1,6 @@
 // Downloads of lists, read page by page; energies are always in joules.
-import { get, getText, query } from './api.js';
+import { getText, query } from './api.js';
+import { newest } from './logs.js';
 
 const pageRows = 1000;
 
@@ -30,19 +31,8 @@ export async function saveText(path, name, progress, signal) {
 }
 
 async function saveJson(filter, progress, signal) {
-  const parts = ['[\n'];
-  let cursor;
-  let count = 0;
-  do {
-    const page = await get(`/v1/missions${query({ ...filter, limit: pageRows, cursor })}`, signal);
-    if (page.missions.length > 0)
-      parts.push((count > 0 ? ',\n' : '') + page.missions.map((m) => JSON.stringify(m)).join(',\n'));
-    count += page.missions.length;
-    cursor = page.next_cursor;
-    progress(count);
-  } while (cursor !== null);
-  parts.push('\n]\n');
-  save(parts, 'missions', 'json');
+  const { entries } = await newest('/v1/missions', filter, Infinity, signal, progress);
+  save(['[\n', entries.map((m) => JSON.stringify(m)).join(',\n'), '\n]\n'], 'missions', 'json');
 }
 
 export const exportMissions = (kind, filter, progress, signal) =>

@@ -231,7 +231,7 @@ export function FloorPath({
   under = null,
 }) {
   const shown = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
-  const dark = useTheme();
+  useTheme(); // the scale is of the theme
   const scale = scaleFor(
     kind,
     shown.map((row) => row[2]),
@@ -279,7 +279,7 @@ export function FloorPath({
         changes={[points, kind, cursor, robot, under]}
       />
       {legend && shown.some((row) => row[2] > 0 || kind === 'gap') && (
-        <Legend scale={scale} dark={dark} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
+        <Legend scale={scale} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
       )}
     </div>
   );
@@ -287,23 +287,11 @@ export function FloorPath({
 
 export function Legend({ scale, title, unit = 'W' }) {
   const middle = (scale.low + scale.high) / 2;
-  const draw = (c, width, height) => {
-    const step = width / scale.colours.length;
-    scale.colours.forEach((colour, k) => {
-      c.fillStyle = colour;
-      c.fillRect(k * step, 0, step + 1, height);
-    });
-  };
   return (
     <div class="legend">
       <span class="legend-title">{title}</span>
       <span class="number">{digits(scale.low, 2)}</span>
-      <Canvas
-        draw={draw}
-        height={10}
-        label={`Colours from ${scale.low} to ${scale.high} ${unit}`}
-        changes={[scale.low, scale.high, title, scale.colours]}
-      />
+      <span class="colours" style={{ background: `linear-gradient(90deg, ${scale.colours})` }} />
       <span class="number">
         {digits(scale.high, 2)}
         {'\u00a0'}

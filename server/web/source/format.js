@@ -121,24 +121,9 @@ export function about(second) {
     : `${Math.floor(minutes / 60)}\u00a0h ${String(minutes % 60).padStart(2, '0')}\u00a0min`;
 }
 
-function parts(utimeUs) {
-  const d = new Date(utimeUs / 1000);
-  const two = (v) => String(v).padStart(2, '0');
-  return {
-    day: `${d.getFullYear()}-${two(d.getMonth() + 1)}-${two(d.getDate())}`,
-    clock: `${two(d.getHours())}:${two(d.getMinutes())}:${two(d.getSeconds())}`,
-  };
-}
-
-export function time(utimeUs) {
-  if (!known(utimeUs)) return dash;
-  const { day, clock } = parts(utimeUs);
-  return `${day} ${clock}`;
-}
-
-export function clock(utimeUs) {
-  return known(utimeUs) ? parts(utimeUs).clock : dash;
-}
+const local = new Intl.DateTimeFormat('sv', { dateStyle: 'short', timeStyle: 'medium' });
+export const time = (utimeUs) => (known(utimeUs) ? local.format(utimeUs / 1000) : dash);
+export const clock = (utimeUs) => time(utimeUs).slice(-8);
 
 // "1 robot", "3 robots".
 export const count = (n, noun, several = `${noun}s`) => `${fixed(n)} ${n === 1 ? noun : several}`;

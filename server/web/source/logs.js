@@ -5,8 +5,8 @@ import { get, query, useRead } from './api.js';
 const mostOfPage = 1000;
 
 // The newest entries of the list at `path`, newest first unless the filter has another order: at least
-// `count`, or all. {entries, next}; `next` is null after the last one.
-export async function newest(path, filter, count, signal) {
+// `count`, or all. {entries, next}; `next` is null after the last one. `progress(entries so far)`.
+export async function newest(path, filter, count, signal, progress) {
   const entries = [];
   let next = null;
   do {
@@ -14,6 +14,7 @@ export async function newest(path, filter, count, signal) {
     const answer = await get(`${path}${query(page)}`, signal);
     entries.push(...(answer.events ?? answer.missions ?? answer.entries));
     next = answer.next_cursor;
+    progress?.(entries.length);
   } while (next && entries.length < count);
   return { entries, next };
 }

@@ -144,9 +144,9 @@ function App() {
       <OfflineBanner />
       <SignIn />
       <main id="main" tabindex="-1" ref={main}>
-        <Guard view={location.hash}>
+        <Guard key={route.hash}>
           {View ? (
-            <View key={route.hash} id={route.id} given={route.given} />
+            <View id={route.id} given={route.given} />
           ) : (
             <Empty title="There is no such page">
               Go to the <a href="#/fleet">fleet</a>.

@@ -44,7 +44,14 @@ export function Head({ columns, sort, onSort }) {
     <thead>
       <tr>
         {columns.map((c) => (
-          <th key={c.key} scope="col" class={c.class} title={c.hint} aria-sort={direction(c)}>
+          <th
+            key={c.key}
+            scope="col"
+            class={c.class}
+            style={{ width: c.width }}
+            title={c.hint}
+            aria-sort={direction(c)}
+          >
             <Title column={c} sort={sort} onSort={onSort} />
           </th>
         ))}

@@ -1,5 +1,6 @@
 // The ledger as a waterfall: each account starts where the one above ended, and the last ends at the
 // battery's energy. Unexplained is hatched: it is integrated from the measured gap, not computed as the rest.
+import { Bars } from './bars.jsx';
 import { energyIn, energyScale } from './energy.js';
 import * as format from './format.js';
 import { Quantity } from './widgets.jsx';
@@ -80,26 +81,6 @@ const hatch = (
   </svg>
 );
 
-function Row({ row, x, end, scale }) {
-  const value = row.total ? row.to : row.change;
-  const q = energyIn(scale, value);
-  const kind = row.total ? `total ${row.key}` : row.key === 'unexplained' ? 'odd' : '';
-  return (
-    <tr class={kind}>
-      <th scope="row">{row.name}</th>
-      <td class="bar-cell">
-        <Bar row={row} x={x} end={end} />
-      </td>
-      <td class="figure">
-        <Quantity of={q} sign={!row.total} />
-      </td>
-      <td class="figure share">
-        <Quantity of={format.percent(end !== 0 ? value / end : null, 1)} />
-      </td>
-    </tr>
-  );
-}
-
 function Closing({ sum, end, scale, closure, absent }) {
   const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
   return (
@@ -128,25 +109,26 @@ export function Waterfall({ terms, total, closure, measured = true }) {
     to: total,
     total: true,
   };
+  const barOf = (row) => {
+    const value = row.total ? row.to : row.change;
+    return {
+      key: row.key,
+      class: row.total ? `total ${row.key}` : row.key === 'unexplained' ? 'odd' : '',
+      name: row.name,
+      bar: <Bar row={row} x={x} end={total} />,
+      of: <Quantity of={energyIn(scale, value)} sign={!row.total} />,
+      note: <Quantity of={format.percent(total !== 0 ? value / total : null, 1)} />,
+    };
+  };
   return (
-    <div class="waterfall">
+    <>
       {hatch}
-      <table>
-        <thead class="hidden">
-          <tr>
-            <th scope="col">Account</th>
-            <th scope="col">Bar</th>
-            <th scope="col">Energy</th>
-            <th scope="col">Share</th>
-          </tr>
-        </thead>
-        <tbody>
-          {[...shown, last].map((row) => (
-            <Row key={row.key} row={row} x={x} end={total} scale={scale} />
-          ))}
-        </tbody>
-      </table>
+      <Bars
+        class="waterfall"
+        head={['Account', 'Bar', 'Energy', 'Share']}
+        rows={[...shown, last].map(barOf)}
+      />
       <Closing sum={sum} end={total} scale={scale} closure={closure} absent={absent} />
-    </div>
+    </>
   );
 }

@@ -1,5 +1,4 @@
-import { Component } from 'preact';
-import { useEffect, useMemo, useState } from 'preact/hooks';
+import { useEffect, useErrorBoundary, useMemo, useState } from 'preact/hooks';
 import { askToSignIn } from './api.js';
 import * as format from './format.js';
 import { refusalFor } from './session.js';
@@ -192,24 +191,9 @@ export const MissionState = ({ mission: { state } }) => (
 );
 
 // Confines an error in one view to that view.
-export class Guard extends Component {
-  constructor() {
-    super();
-    this.state = { error: null };
-  }
-  static getDerivedStateFromError(error) {
-    return { error };
-  }
-  componentDidCatch(error) {
-    console.error(error);
-  }
-  componentDidUpdate(before) {
-    if (before.view !== this.props.view && this.state.error !== null) this.setState({ error: null });
-  }
-  render() {
-    if (this.state.error === null) return this.props.children;
-    return <Failure error={this.state.error} retry={() => this.setState({ error: null })} />;
-  }
+export function Guard({ children }) {
+  const [error, reset] = useErrorBoundary(console.error);
+  return error ? <Failure error={error} retry={reset} /> : children;
 }
 
 // Ids, or [id, name], as options of a choice; drawn again only when they change, since live values come many

@@ -1,6 +1,7 @@
 // Charts of a diagnosis: the error of the modelled power by operating condition, on the floor and over time.
 import { useMemo, useState } from 'preact/hooks';
 import { Chart, axis, bars, line } from '../chart.jsx';
+import { strokeThrough } from '../floor.jsx';
 import * as format from '../format.js';
 import { TablePanel, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
@@ -31,14 +32,11 @@ function drawWhiskers(u, half, shift) {
   const c = u.ctx;
   c.strokeStyle = palette().ink;
   c.lineWidth = 1.5 * devicePixelRatio;
-  c.beginPath();
   half.forEach((w, k) => {
     if (!format.known(w)) return;
     const x = u.valToPos(u.data[0][k] + shift, 'x', true);
-    c.moveTo(x, u.valToPos(u.data[1][k] - w, 'y', true));
-    c.lineTo(x, u.valToPos(u.data[1][k] + w, 'y', true));
+    strokeThrough(c, x, u.valToPos(u.data[1][k] - w, 'y', true), x, u.valToPos(u.data[1][k] + w, 'y', true));
   });
-  c.stroke();
 }
 
 function ConditionChart({ map, after }) {

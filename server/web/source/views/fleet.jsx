@@ -75,6 +75,12 @@ const Spark = ({ entry, revision, dark }) => (
 );
 const hint = 'measured energy over modelled energy, median of the newest missions';
 
+const widths = Object.fromEntries(
+  'robot=11% power=96px spark=148px charge=116px range=104px time=96px speed=84px ratio=88px mission=16% spent=88px'
+    .split(' ')
+    .map((pair) => pair.split('=')),
+);
+
 // Of rows {id, state, needs, ratio, entry, revision, dark, scale}.
 const columns = [
   ['robot', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
@@ -89,7 +95,12 @@ const columns = [
   ['mission', 'Mission', '', Mission, (r) => r.state.mission?.start_utime_us],
   ['spent', 'Energy', 'figure', (r) => energyIn(r.scale, spentOf(r)), spentOf],
 ].map(([key, title, kind, cell, sort, more]) =>
-  column(key, title, cell, { class: `${kind} ${key === 'ratio' ? 'ratio-cell' : key}`, sort, ...more }),
+  column(key, title, cell, {
+    class: `${kind} ${key === 'ratio' ? 'ratio-cell' : key}`,
+    width: widths[key],
+    sort,
+    ...more,
+  }),
 );
 
 const filters = {

@@ -45,7 +45,7 @@ function drawSquares(c, view, { map, value, scale, marked }) {
 // `value(cell)`: the value that its colour shows, null if missing. `kind` as of scaleFor().
 export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
   const narrow = useNarrow();
-  const dark = useTheme();
+  useTheme(); // the scale is of the theme
   const b = map.bounds;
   const aspect = (b.y_max_m - b.y_min_m) / (b.x_max_m - b.x_min_m);
   const wide = narrow ? Math.min(720, innerWidth - 30) : 740; // about
@@ -88,7 +88,7 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
         hover
         onKeyDown={key}
       />
-      <Legend scale={scale} dark={dark} title={title} unit={unit} />
+      <Legend scale={scale} title={title} unit={unit} />
     </div>
   );
 }

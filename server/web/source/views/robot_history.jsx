@@ -2,6 +2,7 @@
 import { useMemo } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
 import { Chart, axis, clockAxis, line, timesWith } from '../chart.jsx';
+import { strokeThrough } from '../floor.jsx';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
 import { Answer, Empty, Key, List, Panel } from '../widgets.jsx';
@@ -40,10 +41,7 @@ function RatioChart({ history }) {
       if (x < left || x > left + width) return;
       c.strokeStyle = c.fillStyle = colour;
       c.setLineDash(dash.map((d) => d * px));
-      c.beginPath();
-      c.moveTo(x, top);
-      c.lineTo(x, top + height);
-      c.stroke();
+      strokeThrough(c, x, top, x, top + height);
       const room = c.measureText(text).width + 8 * px;
       c.fillText(text, x + room > left + width ? x - room : x + 4 * px, top + row * 14 * px);
     };
@@ -51,10 +49,7 @@ function RatioChart({ history }) {
     c.lineWidth = px;
     c.font = `${11 * px}px "Liberation Sans", Arial, sans-serif`;
     c.strokeStyle = p.muted;
-    c.beginPath();
-    c.moveTo(left, y1);
-    c.lineTo(left + width, y1);
-    c.stroke();
+    strokeThrough(c, left, y1, left + width, y1);
     // A version counts from the first mission that it metered: replayed missions are older than the version.
     for (const v of versions) {
       const first = missions.find((m) => m.model_version === v.model_version);
