@@ -1,3 +1,4 @@
+import { energyIn, energyScale } from './energy.js';
 import { shown } from './widgets.jsx';
 
 // Bars below one another, of rows [share of the width, kind].
@@ -46,4 +47,20 @@ export function Bars({ rows, label, head, class: name = '' }) {
       </tbody>
     </table>
   );
+}
+
+// Energies in one unit, of rows [name, joules, channel, note].
+export function EnergyBars({ label, rows }) {
+  const scale = energyScale(
+    rows.map(([, value]) => value),
+    4,
+  );
+  const barOf = ([name, value, channel, note]) => ({
+    name,
+    value,
+    of: energyIn(scale, value),
+    channel,
+    note,
+  });
+  return <Bars label={label} rows={rows.map(barOf)} />;
 }

@@ -43,25 +43,16 @@ export const clockSteps = [
   [day, [1, 2, 7, 14, 28, 91, 182, 364, 728, 1820]],
 ].flatMap(([unit, counts]) => counts.map((k) => k * unit));
 
-// Local times, with the day where it changes.
-export const clockAxis = { incrs: clockSteps, splits: clockSplits, values: clockValues };
-
-function clockSplits(_, index, low, high, step) {
-  const offset = new Date(low * 1000).getTimezoneOffset() * minute;
-  const splits = [];
-  for (let at = Math.ceil((low - offset) / step) * step + offset; at <= high; at += step) splits.push(at);
-  return splits;
-}
-
-function clockValues(_, splits, index, space, step) {
-  let day = '';
-  return splits.map((second) => {
-    const [today, hour] = time(second * 1e6).split(' ');
-    const text = `${hour.slice(0, step < 60 ? 8 : 5)}${today === day ? '' : `\n${today}`}`;
-    day = today;
-    return text;
-  });
-}
+// Local times, with the day where it changes, of a scale of times.
+const dayChange = '\n{YYYY}-{MM}-{DD}';
+const clockFormat = (step, text) => [step, text, dayChange, null, dayChange, null, null, null, 1];
+export const clockAxis = {
+  values: [
+    [day, '{YYYY}-{MM}-{DD}', null, null, null, null, null, null, 1],
+    clockFormat(minute, '{HH}:{mm}'),
+    clockFormat(1, '{HH}:{mm}:{ss}'),
+  ],
+};
 
 const datePx = 84; // of one label
 

@@ -1,8 +1,7 @@
 // A mission compared with the minimum-energy drive of the same legs.
 import { useMemo } from 'preact/hooks';
 import { idPath, post, query, useGet, useRead } from '../api.js';
-import { Bars } from '../bars.jsx';
-import { energyIn, energyScale } from '../energy.js';
+import { EnergyBars } from '../bars.jsx';
 import * as format from '../format.js';
 import { drivenRuns, leastDriveRequest, payloadsOf } from '../least_drive.js';
 import { Empty, Failure, Loading } from '../widgets.jsx';
@@ -71,25 +70,18 @@ export function LeastEnergy({ mission, trace }) {
   if (answer.value === null) return <Loading what="the minimum-energy drive" />;
   const e = mission.energy;
   const { least, request, payloads } = answer.value;
-  const scale = energyScale([e.measured_j, e.modelled_j, least.energy_j], 4);
-  const row = (name, value, channel, durationS) => ({
-    name,
-    value,
-    of: energyIn(scale, value),
-    channel,
-    note: format.span(durationS),
-  });
+  const drivenS = format.span(e.duration_s);
   return (
     <>
       <p class="verdict">
         <Saving share={1 - least.energy_j / e.modelled_j} />
       </p>
-      <Bars
+      <EnergyBars
         label="Energy of the mission and of the minimum-energy drive"
         rows={[
-          row('Measured', e.measured_j, 'measured', e.duration_s),
-          row('Modelled', e.modelled_j, 'modelled', e.duration_s),
-          row('Least energy', least.energy_j, 'least', least.duration_s),
+          ['Measured', e.measured_j, 'measured', drivenS],
+          ['Modelled', e.modelled_j, 'modelled', drivenS],
+          ['Least energy', least.energy_j, 'least', format.span(least.duration_s)],
         ]}
       />
       <Footnote mission={mission} request={request} payloads={payloads} version={least.model_version} />

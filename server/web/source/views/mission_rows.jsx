@@ -42,40 +42,36 @@ function StateCell({ mission: m }) {
 export function missionColumns(missions, models, withRobot) {
   const scale = energyScale(missions.flatMap((m) => [m.energy.battery_j, m.energy.modelled_j]));
   const share = (m) => chargeShare(m.energy.charge_ah, models.get(m.robot_id));
-  const sort = { sort: true };
   const columns = [
-    column('start', 'Started', (m) => format.time(m.start_utime_us), { class: 'when', ...sort }),
-    column('robot', 'Robot', (m) => <a href={robotLink(m.robot_id)}>{m.robot_id}</a>, sort),
+    column('start', 'Started', (m) => format.time(m.start_utime_us), { class: 'when' }),
+    column('robot', 'Robot', (m) => <a href={robotLink(m.robot_id)}>{m.robot_id}</a>),
     column('mission', 'Mission', (m) => <a href={missionLink(m.id)}>{m.mission_id}</a>, {
       head: true,
-      ...sort,
     }),
-    column('state', 'State', (m) => <StateCell mission={m} />, { class: 'states', ...sort }),
-    figure('duration', 'Duration', (m) => format.span(m.energy.duration_s), sort),
-    figure('distance', 'Distance', (m) => format.length(m.energy.distance_m), sort),
+    column('state', 'State', (m) => <StateCell mission={m} />, { class: 'states' }),
+    figure('duration', 'Duration', (m) => format.span(m.energy.duration_s)),
+    figure('distance', 'Distance', (m) => format.length(m.energy.distance_m)),
     figure('payload', 'Payload', (m) => format.unit(m.payload_kg, 'kg'), {
       class: 'figure wide',
-      ...sort,
     }),
-    figure('energy', 'Energy', (m) => energyIn(scale, m.energy.battery_j), sort),
+    figure('energy', 'Energy', (m) => energyIn(scale, m.energy.battery_j)),
     figure('charge', 'Of charge', (m) => format.percent(share(m), 2), {
       hint: 'share of the full battery, if the robot file states its capacity',
     }),
     figure('modelled', 'Modelled', (m) => energyIn(scale, m.energy.modelled_j), {
       class: 'figure wide',
-      ...sort,
     }),
     figure('ratio', 'Ratio', (m) => <Ratio value={m.ratio} />, {
       hint: 'measured energy over modelled energy',
-      ...sort,
     }),
     figure('consumption', 'Consumption', (m) => consumption(perMetre(m)), {
       class: 'figure long',
       hint: 'energy over distance',
-      ...sort,
     }),
   ];
-  return withRobot ? columns : columns.filter((c) => c.key !== 'robot');
+  return columns
+    .filter((c) => withRobot || c.key !== 'robot')
+    .map((c) => ({ ...c, sort: c.key !== 'charge' }));
 }
 
 export function MissionTable({ missions, withRobot = true, sort, onSort }) {

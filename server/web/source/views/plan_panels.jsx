@@ -1,8 +1,8 @@
 // The panels of a plan: its certificate, and the energy of usual profiles.
 import { get, idPath, useRead } from '../api.js';
-import { Bars } from '../bars.jsx';
+import { EnergyBars } from '../bars.jsx';
 import { withinLimits } from '../baselines.js';
-import { energy, energyIn, energyScale } from '../energy.js';
+import { energy } from '../energy.js';
 import * as format from '../format.js';
 import { Facts, Failure } from '../widgets.jsx';
 import { priceOfHaste } from './plan_charts.jsx';
@@ -69,28 +69,16 @@ function noteOf(found, plan) {
 export function Baselines({ answer, request }) {
   const { error, found } = useBaselines(answer, request);
   if (error) return <Failure error={error} />;
-  const kinds = [
-    ['Trapezoid', found[0]],
-    ['Triangle', found[1]],
-  ];
-  const scale = energyScale([answer.energy_j, ...kinds.map(([, b]) => b?.energyJ)], 4);
-  const rows = kinds.map(([name, b]) => ({
+  const rows = ['Trapezoid', 'Triangle'].map((name, k) => [
     name,
-    value: b?.energyJ ?? null,
-    of: energyIn(scale, b?.energyJ),
-    channel: 'plain',
-    note: noteOf(b, answer),
-  }));
-  const plan = {
-    name: 'Least energy',
-    value: answer.energy_j,
-    of: energyIn(scale, answer.energy_j),
-    channel: 'least',
-    note: format.span(answer.duration_s),
-  };
+    found[k]?.energyJ ?? null,
+    'plain',
+    noteOf(found[k], answer),
+  ]);
+  rows.unshift(['Least energy', answer.energy_j, 'least', format.span(answer.duration_s)]);
   return (
     <>
-      <Bars label="Energy of the plan, a trapezoid and a triangle within the limits" rows={[plan, ...rows]} />
+      <EnergyBars label="Energy of the plan, a trapezoid and a triangle within the limits" rows={rows} />
       <p class="note foot">
         Usual profiles on every run between stops, in the plan’s time where the robot’s limits allow it.
       </p>

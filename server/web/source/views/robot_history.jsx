@@ -71,7 +71,7 @@ function RatioChart({ history }) {
     const p = palette();
     return {
       scales: {
-        x: { time: false, ...timesWith((spanS) => Math.max(60, 0.02 * spanS)) },
+        x: { time: true, ...timesWith((spanS) => Math.max(60, 0.02 * spanS)) },
         y: { range: () => [1 - spread, 1 + spread] },
       },
       axes: [axis('', { size: 42, space: 90, ...clockAxis }), axis('measured / modelled', { size: 56 })],
