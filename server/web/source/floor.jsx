@@ -138,7 +138,7 @@ export function Canvas({ draw, height, label, changes, ...more }) {
 // A canvas to scale with grid and scale bar. `viewFor(width, height)` gives its view, and
 // `draw(context, view)` draws the content between them; `onPlace(x m, y m, view)` is called at a click, with
 // `hover` also where the pointer is.
-export function FloorView({ viewFor, draw, under = drawGrid, onPlace, hover, ...more }) {
+export function FloorView({ viewFor, draw, under = drawGrid, onPlace, hover, children, ...more }) {
   const view = useRef(null);
   const paint = (c, width, tall) => {
     const v = (view.current = viewFor(width, tall));
@@ -147,7 +147,12 @@ export function FloorView({ viewFor, draw, under = drawGrid, onPlace, hover, ...
     drawScaleBar(c, v);
   };
   const point = (event) => onPlace?.(...view.current.from(...placeIn(event)), view.current);
-  return <Canvas draw={paint} onClick={point} onPointerMove={hover && point} {...more} />;
+  return (
+    <div class="floor-box">
+      <Canvas draw={paint} onClick={point} onPointerMove={hover && point} {...more} />
+      {children}
+    </div>
+  );
 }
 
 // The place of the pointer in the element, in pixels.
@@ -270,18 +275,17 @@ export function FloorPath({
     }
   };
   return (
-    <div class="floor-box">
-      <FloorView
-        viewFor={viewFor}
-        draw={draw}
-        height={height}
-        label={label}
-        changes={[points, kind, cursor, robot, under]}
-      />
+    <FloorView
+      viewFor={viewFor}
+      draw={draw}
+      height={height}
+      label={label}
+      changes={[points, kind, cursor, robot, under]}
+    >
       {legend && shown.some((row) => row[2] > 0 || kind === 'gap') && (
         <Legend scale={scale} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
       )}
-    </div>
+    </FloorView>
   );
 }
 

@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { robotLink } from '../route.js';
 import { SortChoice, Table, TablePanel, column, figure, sorted, turned } from '../table.jsx';
-import { Answer, Empty, Facts, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, Facts, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 
 const renewMs = 2000;
 const lateStoredS = 10; // samples are stored twice a second
@@ -120,12 +120,12 @@ function Shown({ of, live }) {
   return (
     <>
       {of.error && (
-        <div class="failure" role="alert">
-          <p class="empty-title">{of.node} does not reach the database</p>
-          <p>
-            {of.error}. The data were read {ago(of.read_s)}.
-          </p>
-        </div>
+        <Failure
+          error={{
+            title: `${of.node} does not reach the database`,
+            message: `${of.error}. The data were read ${ago(of.read_s)}.`,
+          }}
+        />
       )}
       <Summary nodes={of.nodes} leases={leases} />
       <TablePanel

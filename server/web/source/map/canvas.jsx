@@ -15,16 +15,14 @@ export function MapCanvas({ level, image, points, draw, changes, label, onPick }
     draw(c, view);
   };
   return (
-    <div class="floor-box">
-      <FloorView
-        viewFor={viewFor}
-        draw={paint}
-        under={image ? (c, view) => drawPlan(c, view, level, image) : undefined}
-        height={height}
-        label={label}
-        changes={[image, level, height, ...changes]}
-        onPlace={(x, y, view) => onPick?.(x, y, 12 / view.scale)}
-      />
-    </div>
+    <FloorView
+      viewFor={viewFor}
+      draw={paint}
+      under={image ? (c, view) => drawPlan(c, view, level, image) : undefined}
+      height={height}
+      label={label}
+      changes={[image, level, height, ...changes]}
+      onPlace={(x, y, view) => onPick?.(x, y, 12 / view.scale)}
+    />
   );
 }

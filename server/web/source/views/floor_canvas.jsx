@@ -75,20 +75,19 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
     event.preventDefault();
   };
   return (
-    <div class="floor-box">
-      <FloorView
-        viewFor={(width, tall) => fit(corners, width, tall, 30)}
-        draw={draw}
-        height={height}
-        changes={[map, title, unit, marked, height]}
-        role="application"
-        tabindex="0"
-        label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones. Arrow keys go from square to square; the tables below have the same figures.`}
-        onPlace={point}
-        hover
-        onKeyDown={key}
-      />
+    <FloorView
+      viewFor={(width, tall) => fit(corners, width, tall, 30)}
+      draw={draw}
+      height={height}
+      changes={[map, title, unit, marked, height]}
+      role="application"
+      tabindex="0"
+      label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones. Arrow keys go from square to square; the tables below have the same figures.`}
+      onPlace={point}
+      hover
+      onKeyDown={key}
+    >
       <Legend scale={scale} title={title} unit={unit} />
-    </div>
+    </FloorView>
   );
 }

@@ -204,12 +204,7 @@ function One({ id }) {
             )}
           </Heading>
           {!ended(d) && <Progress key={d.id} job={d} onEnd={job.reload} />}
-          {d.error && (
-            <div class="failure" role="alert">
-              <p class="empty-title">{stateNotes[d.state]}</p>
-              <p>{d.error}</p>
-            </div>
-          )}
+          {d.error && <Failure error={{ title: stateNotes[d.state], message: d.error }} />}
           {d.result && <Result result={d.result}>{adoptable(d) && <Adopt job={d} />}</Result>}
         </>
       )}
