@@ -123,17 +123,17 @@ TEST_F(CheckCommand, ReadsTableThroughMapping) {
   EXPECT_THAT(fields, ::testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
 }
 
-TEST_F(CheckCommand, NamesMultipliedCountsOfTables) {
-  made::Robot robot = made::virtual_robot("amr", 5, [](auto& spec) {
+TEST_F(CheckCommand, NamesDoubledCountsOfTables) {
+  made::Robot robot = made::virtual_robot("amr", 3, [](auto& spec) {
     spec.sensors.motor_channels = false;
     spec.missions = 1;
   });
   std::string csv = "t,r,l,v,i\n";
   for (const signals::Sample& s : robot.recordings.missions[0].samples)
     csv +=
-        fmt::format("{},{},{},{},{}\n", 1e-6 * static_cast<double>(s.utime_us), 4 * s.wheel_velocity_rad_s[0],
-                    4 * s.wheel_velocity_rad_s[1], s.battery_voltage_v, s.battery_current_a);
-  const std::string table = file("multiplied.csv", csv);
+        fmt::format("{},{},{},{},{}\n", 1e-6 * static_cast<double>(s.utime_us), 2 * s.wheel_velocity_rad_s[0],
+                    2 * s.wheel_velocity_rad_s[1], s.battery_voltage_v, s.battery_current_a);
+  const std::string table = file("doubled.csv", csv);
   json mapping = {{"robot_id", "amr"},
                   {"time", {{"column", "t"}, {"unit", "s"}}},
                   {"fields",
@@ -144,7 +144,7 @@ TEST_F(CheckCommand, NamesMultipliedCountsOfTables) {
   EXPECT_EQ(check({table, "--mapping", how}), Exit::ok);
   EXPECT_THAT(printed_, HasSubstr("compared with a robot file only: --robot FILE"));
   EXPECT_EQ(check({table, "--mapping", how, "--robot", amr}), Exit::fault);
-  EXPECT_THAT(printed_, HasSubstr("wheel_velocity looks 4 times the motion,"));
+  EXPECT_THAT(printed_, HasSubstr("wheel_velocity looks 2 times the motion,"));
   // Divided once too often.
   for (json& side : mapping["fields"]["wheel_velocity"]) side["divide_by"] = 2673.8;
   EXPECT_EQ(check({table, "--mapping", file("n.json", mapping.dump()), "--robot", amr}), Exit::warned);

@@ -120,7 +120,8 @@ try {
   for (const [name, c] of Object.entries(result.baseline.terms))
     assert.ok(main.includes(name) && main.includes(c.unit), name);
   assert.equal(await page.locator('.uplot').count(), result.figures.maps.length + 1, 'charts');
-  assert.equal(await page.locator('canvas.floor').count(), 2, 'the floor and its scale');
+  assert.equal(await page.locator('canvas.floor').count(), 1, 'the floor');
+  assert.equal(await page.locator('.legend .colours').count(), 1, 'its scale');
   assert.equal(
     await page.locator('[data-title="Payload, kg"]').count(),
     result.figures.missions.mission_id.length,
