@@ -124,22 +124,15 @@ export function getOnce(path) {
 }
 export const forget = (path) => kept.delete(path);
 
+// `read` after a pause, unless its request is not needed any more.
+export const delayed = (read, ms) => async (signal) => {
+  await new Promise((wait) => setTimeout(wait, ms));
+  signal.throwIfAborted();
+  return read(signal);
+};
+
 // The newest map that `read(signal)` resolves to; empty at first. It is read after the first view is drawn,
 // every `renewMs`, and when `key` changes; an empty key reads nothing. A failed request keeps the map: the
 // live view reports that the service is gone.
-export function useRenewed(read, renewMs, key) {
-  const [value, setValue] = useState(new Map());
-  useEffect(() => {
-    if (key === '') return undefined;
-    const abort = new AbortController();
-    const renew = () => read(abort.signal).then(setValue, () => {});
-    const first = setTimeout(renew, 300);
-    const timer = setInterval(renew, renewMs);
-    return () => {
-      abort.abort();
-      clearTimeout(first);
-      clearInterval(timer);
-    };
-  }, [key]);
-  return value;
-}
+const none = new Map();
+export const useRenewed = (read, renewMs, key) => useRead(delayed(read, 300), key, 0, renewMs).value ?? none;

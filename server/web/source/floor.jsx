@@ -248,20 +248,11 @@ export function FloorPath({
     c.lineWidth = 3.2;
     c.lineCap = 'round';
     c.lineJoin = 'round';
-    let colour = null;
     for (let k = 1; k < shown.length; ++k) {
-      // segments of one colour are one stroke
       const value = shown[k][2];
-      const own = Number.isFinite(value) ? scale.colourOf(value) : palette().line;
-      if (own !== colour) {
-        if (colour !== null) c.stroke();
-        c.strokeStyle = colour = own;
-        c.beginPath();
-        c.moveTo(...view.to(shown[k - 1][0], shown[k - 1][1]));
-      }
-      c.lineTo(...view.to(shown[k][0], shown[k][1]));
+      c.strokeStyle = Number.isFinite(value) ? scale.colourOf(value) : palette().line;
+      strokeThrough(c, ...view.to(...shown[k - 1]), ...view.to(...shown[k]));
     }
-    if (colour !== null) c.stroke();
     if (shown.length > 1 && ends) drawEnds(c, view, shown);
     if (robot) drawRobot(c, view, robot[0], robot[1], robot[2] ?? 0, palette().ink);
     const at = cursor === null ? null : points[cursor];

@@ -1,7 +1,7 @@
 // Adding, editing and removing a robot: its file from the disk, from another robot, or by a form that is made
 // from the service's schema of robot files, and reviewed by the service as it changes.
 import { useMemo, useState } from 'preact/hooks';
-import { del, get, idPath, post, put, query, useGet, useRead } from '../api.js';
+import { del, delayed, get, idPath, post, put, query, useGet, useRead } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { reloadFleet, useLive, useModelled } from '../live.js';
@@ -142,12 +142,8 @@ function FileField({ of, file, fixed, finding, onChange }) {
 
 // The service's review of the file; null until it is read.
 function useReview(file) {
-  const read = async (signal) => {
-    await new Promise((wait) => setTimeout(wait, reviewMs));
-    signal.throwIfAborted();
-    return post('/v1/robot-checks', file, signal);
-  };
-  return useRead(read, !refusalFor('plan') && JSON.stringify(file)).value;
+  const read = (signal) => post('/v1/robot-checks', file, signal);
+  return useRead(delayed(read, reviewMs), !refusalFor('plan') && JSON.stringify(file)).value;
 }
 
 function Review({ of, file }) {

@@ -11,7 +11,6 @@ import { missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Cells, Head, SortChoice, column, names, sorted, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
-import { useTheme } from '../theme.js';
 import { useToday } from '../today.js';
 import {
   Button,
@@ -70,9 +69,6 @@ const Mission = ({ id, state: { mission, live } }) =>
     <span class="note">{live ? 'idle' : '–'}</span>
   );
 
-const Spark = ({ entry, revision, dark }) => (
-  <Sparkline track={entry.power} revision={revision} dark={dark} />
-);
 const hint = 'measured energy over modelled energy, median of the newest missions';
 
 const widths = Object.fromEntries(
@@ -81,12 +77,12 @@ const widths = Object.fromEntries(
     .map((pair) => pair.split('=')),
 );
 
-// Of rows {id, state, needs, ratio, entry, revision, dark, scale}.
+// Of rows {id, state, needs, ratio, entry, scale}.
 const columns = [
   ['robot', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
   ['health', 'Attention', '', (r) => <Health state={r.state} reasons={r.needs?.reasons} />, urgency],
   ['power', 'Power', 'figure', Power, (r) => powerNow(r.state)],
-  ['spark', 'Last 90 s', '', Spark],
+  ['spark', 'Last 90 s', '', ({ entry }) => <Sparkline track={entry.power} />],
   ['charge', 'Charge', '', Charge, (r) => r.state.state_of_charge],
   ['range', 'Range', 'figure', Range, (r) => r.state.range_m],
   ['time', 'Run time', 'figure wide', (r) => format.about(timeOf(r)), timeOf],
@@ -118,7 +114,7 @@ const filters = {
 
 class Row extends Component {
   shouldComponentUpdate(next) {
-    return ['revision', 'entry', 'index', 'dark', 'needs', 'ratio', 'unit'].some(
+    return ['revision', 'entry', 'index', 'needs', 'ratio', 'unit'].some(
       (key) => next[key] !== this.props[key],
     );
   }
@@ -260,7 +256,6 @@ function Spacer({ rows, heightPx }) {
 }
 
 function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
-  const dark = useTheme();
   const heightPx = useNarrow() ? cardPx : rowPx;
   const [body, first, last] = useWindow(shown.length, heightPx);
   const scale = energyScale([...live.robots.values()].map(({ state }) => state.mission?.energy.battery_j));
@@ -276,7 +271,6 @@ function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
             entry={entry}
             revision={entry.revision}
             index={first + k}
-            dark={dark}
             needs={attention.get(entry.id)}
             ratio={ratios.get(entry.id)}
             scale={scale}

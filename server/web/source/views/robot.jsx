@@ -8,7 +8,6 @@ import { Health, Reasons, between, chargeNote, now, since, unheard } from '../he
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
-import { useTheme } from '../theme.js';
 import { Button, Empty, Facts, Failure, Heading, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
@@ -68,12 +67,9 @@ function LiveMap({ entry }) {
 }
 
 function Now({ entry }) {
-  const dark = useTheme();
   const s = entry.state;
   const measured = s.measured_power_w !== null;
-  const trace = (
-    <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={90} height={26} />
-  );
+  const trace = <Sparkline track={entry.power} width={90} height={26} />;
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
   const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
   const toCharge = s.charge.time_to_charged_s;
