@@ -306,24 +306,19 @@ await check('charts of live values are filled on opening', async () => {
   const kept = () => get(`/v1/recent-values?robot_id=${robot}`);
   // Enough values that a page which waits for live ones would not have them yet.
   await until('half a minute of values', async () => (await kept()).robots[0].utime_us.length > 30, 60);
-  // Share of the canvas columns in which the measured power is drawn.
-  const filled = (canvas) => {
-    const hex = getComputedStyle(document.documentElement).getPropertyValue('--measured').trim();
-    const wanted = [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
-    const { width, height } = canvas;
-    const copy = new OffscreenCanvas(width, height).getContext('2d');
-    copy.drawImage(canvas, 0, 0);
-    const { data } = copy.getImageData(0, 0, width, height);
-    let columns = 0;
-    for (let x = 0; x < width; ++x)
-      for (let y = 0; y < height; ++y) {
-        const at = 4 * (y * width + x);
-        if (data[at + 3] > 200 && wanted.every((v, k) => Math.abs(data[at + k] - v) < 40)) {
-          columns += 1;
-          break;
-        }
-      }
-    return columns / width;
+  // Share of the width over which the measured power is drawn, in its colour.
+  const filled = (chart) => {
+    const trace = chart.querySelector('.measured');
+    const colour = getComputedStyle(document.documentElement).getPropertyValue('--measured').trim();
+    const [r, g, b] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
+    if (getComputedStyle(trace).stroke !== `rgb(${r}, ${g}, ${b})`) return 0;
+    let drawn = 0;
+    let at = 0;
+    for (const [, kind, x] of (trace.getAttribute('d') ?? '').matchAll(/([ML])(-?[\d.]+) -?[\d.]+/g)) {
+      if (kind === 'L') drawn += Math.min(Number(x), chart.clientWidth) - Math.max(at, 0);
+      at = Number(x);
+    }
+    return drawn / chart.clientWidth;
   };
   for (const [hash, trace] of [
     ['#/fleet', `.fleet tbody tr:has-text("${robot}") .sparkline`],
