@@ -33,6 +33,7 @@ enum class Relation : std::size_t {
                  // speed and for acceleration, m g v sin(pitch), the model's at half the steady speed; where
                  // the model has no braking
   idle,          // battery power, 1; standing
+  motion,        // battery power, the model's, 1
   sag,           // changes of the battery's voltage, of its current, from one cell to the next
   climb,         // battery power less the model's, m g v sin(pitch), 1
   gyro,          // yaw rate, w right, w left, 1
