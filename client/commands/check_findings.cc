@@ -9,7 +9,6 @@
 
 #include "client/commands/server_answer.h"
 #include "client/wrapped.h"
-#include "gap/diagnose/wheel_scale.h"
 #include "signals/gaps.h"
 #include "telemetry/impossible.h"
 #include "telemetry/slow_stream.h"
@@ -89,10 +88,7 @@ void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, F
   for (const plausibility::Check& check : plausibility::drop_impossible(recordings, robot))
     findings.push_back({check.value >= telemetry::mistaken_share * static_cast<double>(recordings.samples),
                         recordings.robot_id, check.channel, check.id + ": " + check.says, check.value});
-  std::vector<plausibility::Check> checks = plausibility::check_recordings(recordings, robot);
-  plausibility::silence_contradicted(recordings, checks);
-  if (auto scale = gap::wheel_scale_by_power(robot, recordings)) checks.push_back(std::move(*scale));
-  for (const plausibility::Check& check : checks)
+  for (const plausibility::Check& check : plausibility::check_recordings(recordings, robot))
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
   for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});

@@ -20,6 +20,8 @@ enum class Property : std::size_t {
   following,  // of commands
   top_speed,
   top_turn,
+  steady_power,
+  accelerating_power,
   inertia,
   voltage_constant,
   resistance,
@@ -44,6 +46,8 @@ struct EvidenceTraits {
   bool magnitude = false;              // its sign is not observed
   bool by_gear = false;                // the expected value is proportional to the file's gear ratio
   bool by_power = false;               // ... to the file's powers
+  bool heavy_tails = false;            // `off` is the scale of Student's t with three degrees of freedom
+  double unexplained = 0;              // error of the ratio's logarithm by what its fit leaves unexplained
   bool both_sides = false;             // meaningless where the sides of a pair have different error factors
   std::vector<std::size_t> lost_by{};  // meaningless where these are wrong by more than their sign
 };
@@ -55,14 +59,14 @@ struct ChannelEvidence : EvidenceTraits {
   std::string says;  // "the gyro reads", followed by "3.1 times" and `against`
   std::string against;
   Estimate ratio;
-  std::vector<std::pair<std::size_t, int>> powers;
+  std::vector<std::pair<std::size_t, double>> powers;
   // Tolerance for sound robots: standard deviation of the ratio's logarithm, below and above 1. 0: no ratio
   // is too low (or too high).
   std::array<double, 2> off{};
   double trust = 0;  // largest penalty of an explanation by this evidence, in nats
   double alike = 1;  // number of all evidence of its property, which counts once together
 
-  int power_of(std::size_t reading) const;  // 0: it does not depend on it
+  double power_of(std::size_t reading) const;  // 0: it does not depend on it
 };
 
 // Constants of one motor, all at the wheel: V = R i + K w + c sgn(w), and its current at a steady mean speed.

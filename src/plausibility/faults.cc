@@ -43,17 +43,18 @@ struct Combined {
 // The ratio that the faults predict for this evidence; empty where they make it meaningless.
 std::optional<double> predicted(const ChannelEvidence& e, const Combined& faults) {
   const auto& factor = faults.factor;
-  const auto lost_by = [&](std::size_t k) { return std::ranges::count(e.lost_by, k) > 0; };
   // A path along a reversed heading is not the reversed path.
   const auto lost = [&](std::size_t k) { return k == heading ? factor[k] != 1 : std::fabs(factor[k]) != 1; };
   if (std::ranges::any_of(e.lost_by, lost)) return std::nullopt;
   double ratio = 1;
   for (const auto& [k, power] : e.powers)
-    if (factor[k] != 1) ratio *= std::pow(factor[k], power);
+    if (factor[k] != 1)
+      ratio *= std::pow(std::fabs(factor[k]), power) *
+               (factor[k] < 0 && std::fmod(std::fabs(power), 2) == 1 ? -1 : 1);
   for (const std::size_t right : {wheel_velocity, motor_voltage, motor_current}) {
     // The power of a load barely depends on the direction of a wheel.
     const double r = factor[right], l = factor[right + 1];
-    if (e.both_sides && (lost_by(right) ? std::fabs(r) != std::fabs(l) : e.power_of(right) != 0 && r != l))
+    if (e.both_sides && (e.by_power ? std::fabs(r) != std::fabs(l) : e.power_of(right) != 0 && r != l))
       return std::nullopt;
   }
   if (std::popcount(faults.swaps & e.turned_by) % 2 == 1) ratio = -ratio;
@@ -68,8 +69,10 @@ double core_of(Property property) {
     case Property::gyro_track:
     case Property::map_track:
     case Property::radius:
+    case Property::accelerating_power:
       return 0.05;
     case Property::following:
+    case Property::steady_power:
       return 0.1;
     case Property::voltage_constant:
       return 0.2;
@@ -84,10 +87,13 @@ double surprise_of(const ChannelEvidence& e, const Combined& faults) {
   if (!expected) return std::min(lost_surprise, e.trust);
   const double ratio = e.ratio.value / *expected;
   if (ratio < 0) return e.trust;
-  const double log_sd = e.ratio.sd / std::fabs(e.ratio.value);
+  const double log_sd = std::hypot(e.ratio.sd / e.ratio.value, e.unexplained);
   const double off = std::log(ratio), tolerance = e.off[off < 0 ? 0 : 1], core = core_of(e.property);
   if (tolerance == 0) return 0;
-  const auto squares = [&](double sd) { return 0.5 * off * off / (sd * sd + log_sd * log_sd); };
+  const auto squares = [&](double sd) {
+    const double z2 = off * off / (sd * sd + log_sd * log_sd);
+    return e.heavy_tails ? 2 * std::log1p(z2 / 3) : 0.5 * z2;
+  };
   const double surprise = std::min(squares(tolerance), e.trust);
   if (core == 0) return surprise;
   const double within = tolerance / (tolerance + core);  // relative density in the middle
@@ -103,6 +109,12 @@ double surprise_of(std::span<const ChannelEvidence> evidence, const Combined& fa
     total += surprise_of(e, faults);
   }
   return total;
+}
+
+// 1 for swapped sides.
+double factor_of(const ChannelFault& fault) {
+  const auto factor = std::ranges::find_if(fault.factor, [](double f) { return f != 1; });
+  return factor == fault.factor.end() ? 1 : *factor;
 }
 
 Set set_without(const Set& set, const ChannelFault* fault) {
@@ -178,11 +190,11 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
        {"converted from rpm once too often", 1 / rpm, odd_nats},
        {"given in turns a second", 0.5 / std::numbers::pi, odd_nats},
        {"divided by the gear ratio once too often", 1 / gear, odd_nats},
-       {"computed from km/h as if they were m/s", km_h, odd_nats},
+       {"computed from km/h as if they were m/s", km_h, unit_nats},
        {"computed from m/s as if they were km/h", 1 / km_h, odd_nats},
        {"computed from miles an hour as if they were m/s", mph, odd_nats},
        {"computed from feet a second as if they were m/s", feet, odd_nats},
-       {"2 times the motion, counted twice", 2, odd_nats},
+       {"2 times the motion, counted twice", 2, unit_nats},
        {"4 times the motion, counted four times", 4, odd_nats},
        {"0.5 times the motion, counted half", 0.5, odd_nats},
        {"0.25 times the motion, counted a quarter", 0.25, odd_nats},
@@ -208,6 +220,9 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
        {milliamperes, 1000, unit_nats},
        {"given in mA and reversed", -1000, unit_nats + 1},
        {thousandth, 0.001, odd_nats},
+       {"10 times the true one", 10, odd_nats},
+       {"a tenth of the true one", 0.1, odd_nats},
+       {"a hundredth of the true one", 0.01, odd_nats},
        {"given in W", robot.battery.nominal_voltage_v, unit_nats}});
   add("battery_voltage", "battery_voltage", {battery_voltage},
       {{millivolts, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
@@ -284,16 +299,19 @@ FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
   best.faults = set;
   for (std::size_t k = 0; k < set.size(); ++k) {
     auto& others = best.alternatives.emplace_back();
-    double weight = 1 + std::exp(least - surprise_of(evidence, Combined(set_without(set, set[k]))));
+    // Of the fault or one that is nearly the same, and of all.
+    double weight = 1, all = 1 + std::exp(least - surprise_of(evidence, Combined(set_without(set, set[k]))));
     Set with = set;
     for (const ChannelFault& fault : faults) {
       with[k] = &fault;
       if (std::ranges::count(set, &fault) > 0 || !supported(evidence, with)) continue;
       const double more = surprise_of(evidence, Combined(with)) - least;
-      weight += std::exp(-more);
+      all += std::exp(-more);
+      if (fault.id == set[k]->id && std::fabs(std::log(factor_of(fault) / factor_of(*set[k]))) < same_ratio)
+        weight += std::exp(-more);
       if (more <= nearly) others.push_back(&fault);
     }
-    best.probability.push_back(1 / weight);
+    best.probability.push_back(weight / all);
   }
   return best;
 }
@@ -308,14 +326,15 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
     const auto without = predicted(e, others), with = predicted(e, all);
     if (!without || !with || *without == *with) continue;
     const double supports = surprise_of(e, others) - surprise_of(e, all);
-    if (supports >= least_support) by_gear = by_gear && e.by_gear, by_power = by_power && e.by_power;
-    if (supports <= most) continue;
-    most = supports;
     // The exponent of the fault's own factor; swaps reverse the sign only.
-    int exponent = 1;
+    double exponent = 1;
     for (const auto& [k, power] : e.powers)
       if (fault.factor[k] != 1) exponent = power;
-    const auto factor = [&](double ratio) { return std::pow(ratio / *without, exponent); };
+    if (supports >= least_support)
+      by_gear = by_gear && e.by_gear, by_power = by_power && e.by_power && exponent == 1;
+    if (supports <= most) continue;
+    most = supports;
+    const auto factor = [&](double ratio) { return std::pow(ratio / *without, 1 / exponent); };
     best.evidence = &e;
     best.factor = factor(e.ratio.value);
     const auto interval = e.ratio.interval();
@@ -344,11 +363,11 @@ void check_faults(const CheckContext& c, Checks& checks) {
     // A robot file that is wrong by the factor would look the same.
     const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
     check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);
-    const auto factor = std::ranges::find_if(fault.factor, [](double f) { return f != 1; });
+    const double factor = factor_of(fault);
     check.swapped = fault.swaps != 0 && check.probability > 0.5;
-    if (factor == fault.factor.end() || fault.channel == "utime" || check.probability <= 0.5) continue;
+    if (factor == 1 || fault.channel == "utime" || check.probability <= 0.5) continue;
     // A unit is a correction only where its own measurement agrees with it.
-    if (*factor == -1 || std::fabs(std::log(measured.factor / *factor)) < same_ratio) check.factor = *factor;
+    if (factor == -1 || std::fabs(std::log(measured.factor / factor)) < same_ratio) check.factor = factor;
   }
 }
 

@@ -46,6 +46,7 @@ void Observer::begin(std::string mission_id, double declared_payload_kg) {
   cells_.emplace(limit_rad_s_, declared_payload_kg);
   spans_ = {};
   cells_in_block_ = 0;
+  battery_.fill(signals::unmeasured);
   before_.reset();
   waiting_.reset();
   known_ = {};
@@ -173,9 +174,11 @@ void Observer::take_power(const Cell& c) {
   at.wheel_acceleration_rad_s2 = c.acceleration_rad_s2;
   at.payload_kg = c.mean[reading::payload];
   const auto flow = model_.flow(at);
-  const double modelled = flow.battery_power_w, moving = modelled - flow.ledger[signals::Term::accessories];
+  const double modelled = flow.battery_power_w, idle = flow.ledger[signals::Term::accessories];
   relate(Relation::motors, {vb, ib, vr, vl, ir, il}, {c.battery_power_w, c.motor_power_w, 1.0});
-  relate(Relation::motion, {wr, wl, vb, ib}, {c.battery_power_w, moving, 1.0});
+  relate(Relation::motion, {wr, wl, vb, ib}, {c.battery_power_w, modelled, 1.0});
+  relate(Relation::sag, {vb, ib}, {c.mean[vb] - battery_[0], c.mean[ib] - battery_[1]});
+  battery_ = {c.mean[vb], c.mean[ib]};
   if (c.resting) relate(Relation::idle, {wr, wl, vb, ib}, {c.battery_power_w, 1.0});
   if (c.way[0] == 0 && c.way[1] == 0) return;
   const double speed = 0.5 * robot_.kinematics.wheel_radius_m * (c.mean[wr] + c.mean[wl]);
@@ -183,8 +186,12 @@ void Observer::take_power(const Cell& c) {
   const double climb = weight * speed * std::sin(c.mean[reading::pitch]);
   relate(Relation::climb, {wr, wl, vb, ib, reading::pitch}, {c.battery_power_w - modelled, climb, 1.0});
   if (flow.ledger[signals::Term::kinetic] < 0) return;
+  at.wheel_acceleration_rad_s2 = {};
+  const double steady = model_.flow(at).battery_power_w - idle;
+  for (double& w : at.wheel_speed_rad_s) w *= 0.5;
   relate(Relation::driving, {wr, wl, vb, ib},
-         {c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0)});
+         {c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0), steady,
+          modelled - idle - steady, or_zero(climb), model_.flow(at).battery_power_w - idle});
 }
 
 void Observer::take(const Span& s) {

@@ -29,10 +29,12 @@ enum class Relation : std::size_t {
   torque_right,         // i, sign, w, common and differential acceleration, side slip, 1; the wheel turning
   torque_left,
   motors,        // battery power, power of both motors, 1
-  driving,       // battery power, the model's, 1, battery power plus that of descents; where the model has no
-                 // braking
-  motion,        // battery power, the model's without the idle power, 1
+  driving,       // battery power, the model's, 1, battery power plus that of descents, the model's at steady
+                 // speed and for acceleration, m g v sin(pitch), the model's at half the steady speed; where
+                 // the model has no braking
   idle,          // battery power, 1; standing
+  motion,        // battery power, the model's, 1
+  sag,           // changes of the battery's voltage, of its current, from one cell to the next
   climb,         // battery power less the model's, m g v sin(pitch), 1
   gyro,          // yaw rate, w right, w left, 1
   way,           // speed of the robot by the wheels, its magnitude, 1
@@ -107,6 +109,7 @@ class Observer {
   std::optional<CellCutter> cells_;
   SpanCutter spans_;
   std::size_t cells_in_block_ = 0;
+  std::array<double, 2> battery_{};  // voltage and current of the last cell
   std::optional<signals::Sample> before_,
       waiting_;                // a spike is detected from the next sample
   signals::Sample known_;      // last measured position and yaw rate ...

@@ -311,6 +311,51 @@ TEST(CheckRecordings, SplitsRecordingsAtStep) {
   }
 }
 
+// A robot with battery power and wheel speeds alone.
+made::Robot with_power_alone() {
+  made::Robot robot = made::virtual_robot("amr", 21, [](vr::SimulationSpec& spec) {
+    spec.sensors.motor_channels = false;
+    spec.missions = 3;
+  });
+  alter::fill(robot.recordings,
+              {reading::yaw_rate, reading::x, reading::y, reading::heading, reading::command_speed,
+               reading::command_turn},
+              signals::unmeasured);
+  return robot;
+}
+
+TEST(CheckRecordings, NamesUnitsByPowerAlone) {
+  const made::Robot robot = with_power_alone();
+  for (const double factor : {0.01, 0.1, 10.0}) {
+    telemetry::RecordingSet set = robot.recordings;
+    alter::multiply(set, {reading::battery_current}, factor);
+    const auto checks = check_recordings(set, robot.model);
+    const Check* check = find(checks, "battery_current_scale");
+    ASSERT_TRUE(check) << factor;
+    EXPECT_DOUBLE_EQ(check->factor.value_or(0), factor) << check->says;
+    EXPECT_FALSE(find(checks, "wheel_velocity_scale")) << factor;
+  }
+}
+
+// Friction, mass and a base load that the file does not have are no units.
+TEST(CheckRecordings, AcceptsOtherPhysicsAsSound) {
+  const made::Robot robot = with_power_alone();
+  const auto accepted = [&](const robot::RobotModel& model, double load_w) {
+    telemetry::RecordingSet set = robot.recordings;
+    alter::each_sample(set, [&](signals::Sample& s) { s.battery_current_a += load_w / s.battery_voltage_v; });
+    for (const Check& c : check_recordings(set, model)) EXPECT_FALSE(c.contradicted) << c.says;
+  };
+  for (const double load_w : {0.0, 300.0, 1000.0}) accepted(robot.model, load_w);
+  for (const double factor : {0.15, 0.3, 3.0, 6.0}) {
+    robot::RobotModel file = robot.model;
+    for (double& friction : file.motor.friction_torque_nm) friction *= factor;
+    accepted(file, 0);
+    file = robot.model;
+    file.mass.chassis_kg *= std::clamp(factor, 0.5, 3.0);
+    accepted(file, 0);
+  }
+}
+
 // The plant delays every electrical channel.
 TEST(CheckRecordings, MeasuresElectricalDelay) {
   for (const vr::ShippedRobot& shipped : vr::shipped_robots()) {

@@ -10,7 +10,7 @@
 namespace joulecast::plausibility {
 namespace {
 
-ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<std::size_t, int>> exponents,
+ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<std::size_t, double>> exponents,
                          double off, double trust) {
   ChannelEvidence e;
   e.ratio = {ratio, 0.01 * std::fabs(ratio), 50};
@@ -79,6 +79,60 @@ TEST_F(Faults, StatesProbabilityOfEachFault) {
   ASSERT_EQ(open.probability.size(), 1u);
   // Without a fault both pieces of evidence cost their full trust, 8 nats each.
   EXPECT_NEAR(open.probability[0], 1 / (1 + std::exp(-1.0) + std::exp(3.5 - 16)), 1e-9);
+}
+
+// Heavy tails: 2 log(1 + z^2/3) nats, with the misfit of the evidence's fit in the scale.
+double heavy(double ratio, double scale) {
+  return 2 * std::log1p(std::pow(std::log(ratio), 2) / (3 * (scale * scale + 0.01 * 0.01)));
+}
+
+ChannelEvidence heavy_evidence(double ratio, std::initializer_list<std::pair<std::size_t, double>> exponents,
+                               double scale) {
+  ChannelEvidence e = evidence(ratio, exponents, scale, 30);
+  e.heavy_tails = e.magnitude = e.by_power = e.both_sides = true;
+  return e;
+}
+
+// A tenth of the current moves friction, mass and internal resistance by one factor; wheels in km/h move
+// friction and mass by its square and leave the resistance.
+TEST_F(Faults, WeighsCurrentAgainstWheels) {
+  const auto part = [](double scale) {
+    return heavy_evidence(0.1, {{reading::battery_current, 1}, {reading::wheel_velocity, -2}}, scale);
+  };
+  std::vector<ChannelEvidence> all{part(0.5), part(0.2),
+                                   heavy_evidence(10, {{reading::battery_current, -1}}, 0.7)};
+  std::vector<ChannelFault> two;
+  for (const ChannelFault& f : faults_)
+    if (f.cause == "a tenth of the true one" || f.cause == "computed from km/h as if they were m/s")
+      two.push_back(f);
+  ASSERT_EQ(two.size(), 2u);
+  const FaultExplanation found = explain_faults(all, two);
+  ASSERT_EQ(found.faults.size(), 1u);
+  EXPECT_EQ(found.faults[0]->channel, "battery_current");
+  const double none = heavy(0.1, 0.5) + heavy(0.1, 0.2) + heavy(10, 0.7), tenth = 5.5;
+  const double left = 0.1 * 3.6 * 3.6, wheels = 4 + heavy(left, 0.5) + heavy(left, 0.2) + heavy(10, 0.7);
+  EXPECT_NEAR(found.probability[0], 1 / (1 + std::exp(tenth - none) + std::exp(tenth - wheels)), 1e-9);
+  EXPECT_NEAR(found.gain, none - tenth, 1e-9);
+  // A misfit as large as the parts themselves leaves nothing to conclude.
+  for (ChannelEvidence& e : all) e.unexplained = 3;
+  EXPECT_TRUE(explain_faults(all, two).faults.empty());
+}
+
+// Factors within a fifth of each other are one fault: km/h for m/s, and feet.
+TEST_F(Faults, AddsNearlyEqualFactors) {
+  const std::vector<ChannelEvidence> some{heavy_evidence(1 / 3.6, {{reading::wheel_velocity, -1}}, 0.05),
+                                          heavy_evidence(1 / 3.6, {{reading::wheel_velocity, -1}}, 0.05)};
+  std::vector<ChannelFault> two;
+  for (const ChannelFault& f : faults_)
+    if (f.cause.find("km/h as if") != std::string::npos || f.cause.find("feet") != std::string::npos)
+      two.push_back(f);
+  ASSERT_EQ(two.size(), 2u);
+  const FaultExplanation found = explain_faults(some, two);
+  ASSERT_EQ(found.faults.size(), 1u);
+  EXPECT_NE(found.faults[0]->cause.find("km/h"), std::string::npos);
+  const double none = std::exp(4 - 2 * heavy(3.6, 0.05)),
+               feet = std::exp(4 - 5.5 - 2 * heavy(3.6 / 3.2808, 0.05));
+  EXPECT_NEAR(found.probability[0], (1 + feet) / (1 + feet + none), 1e-9);
 }
 
 // The map's distance is 3 times that of wheels and gyro. Wheel speeds in m/s would explain most of it, but by

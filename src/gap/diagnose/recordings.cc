@@ -9,7 +9,6 @@
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
 #include "gap/diagnose/ripple.h"
-#include "gap/diagnose/wheel_scale.h"
 #include "gap/equations/power.h"
 #include "gap/posterior/explain_recordings.h"
 #include "gap/traits.h"
@@ -58,15 +57,6 @@ class Diagnoser {
     adopted_ = std::move(*adopted);
     if (!prepare()) return nothing_to_judge();
     measure();
-    if (d_.power == PowerSource::battery && from_motion_of(readings_).power) {
-      if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_)) {
-        telemetry::RecordingSet others = recordings_;
-        silence_contradicted(others, std::array{*check});
-        state_correction(*check);
-        d_.checks.push_back(std::move(*check));
-        return Diagnoser(others, robot_, progress_, std::move(d_.checks)).run();
-      }
-    }
     const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
     double part = 0;
     Result<std::unique_ptr<posterior::Fit>> fitted = posterior::fit_missions(
