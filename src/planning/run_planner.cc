@@ -252,10 +252,8 @@ void RunPlanner::add_floor(SpeedGrid& grid) const {
 }
 
 void RunPlanner::build(std::vector<double> nodes) {
-  solver_.reset();
   nodes_ = std::move(nodes);
-  grid_ = std::make_unique<SpeedGrid>(grid_over(nodes_));
-  envelope_ = std::make_unique<SpeedEnvelope>(speed_envelope(*grid_));
+  solver_ = std::make_unique<SpeedSolver>(grid_over(nodes_));
 }
 
 // Only where motors could come near their limits.
@@ -278,8 +276,9 @@ void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid
 }
 
 Result<void> RunPlanner::check_feasible() const {
-  const auto& e = *envelope_;
-  const double top = std::sqrt(grid_->ceiling.front()), top_end = std::sqrt(grid_->ceiling.back());
+  const SpeedGrid& grid = solver_->grid();
+  const SpeedEnvelope& e = solver_->envelope();
+  const double top = std::sqrt(grid.ceiling.front()), top_end = std::sqrt(grid.ceiling.back());
   if (start_ > top * (1 + 1e-9)) {
     return fail(Fault::infeasible, "start_speed_m_s",
                 "is " + number(start_) + ", at most " + number(top) + " is allowed there");
@@ -288,18 +287,18 @@ Result<void> RunPlanner::check_feasible() const {
     return fail(Fault::infeasible, "end_speed_m_s",
                 "is " + number(end_) + ", at most " + number(top_end) + " is allowed there");
   }
-  for (std::size_t k = 0; k < grid_->cells(); ++k) {
+  for (std::size_t k = 0; k < grid.cells(); ++k) {
     for (std::size_t s : {0u, 1u}) {
-      const WheelLoad& w = grid_->load(k)[s];
+      const WheelLoad& w = grid.load(k)[s];
       const double standing = std::fabs(w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck);
-      if (standing >= grid_->torque_limit_nm) {
+      if (standing >= grid.torque_limit_nm) {
         return fail(Fault::infeasible, "limits/current_a",
                     "is " + number(problem_->limits.current_a) + ", friction and slope alone need " +
                         number(standing / loads_->electric().torque_constant_nm_a));
       }
       const double brushes = problem_->limits.voltage_v - voltage_limit_v();
       const double volts =
-          grid_->electric.resistance_ohm[s] / grid_->electric.torque_constant_nm_a * standing + brushes;
+          grid.electric.resistance_ohm[s] / grid.electric.torque_constant_nm_a * standing + brushes;
       if (volts >= problem_->limits.voltage_v) {
         return fail(Fault::infeasible, "limits/voltage_v",
                     "is " + number(problem_->limits.voltage_v) +
@@ -310,10 +309,10 @@ Result<void> RunPlanner::check_feasible() const {
   }
   if (e.feasible) return {};
   const double where = nodes_[std::min(e.broken_at, nodes_.size() - 1)];
-  if (const double fast = e.fastest[e.broken_at]; e.broken_at > 0 && grid_->floor > fast) {
-    const auto lowest = std::ranges::min_element(grid_->ceiling);
-    const double bend = nodes_[static_cast<std::size_t>(lowest - grid_->ceiling.begin())];
-    const bool bound = *lowest < grid_->floor;
+  if (const double fast = e.fastest[e.broken_at]; e.broken_at > 0 && grid.floor > fast) {
+    const auto lowest = std::ranges::min_element(grid.ceiling);
+    const double bend = nodes_[static_cast<std::size_t>(lowest - grid.ceiling.begin())];
+    const bool bound = *lowest < grid.floor;
     return fail(
         Fault::infeasible, "limits/least_speed_m_s",
         fmt::format("is {:.4g}, {} at most {:.4g} {:.4g} m along the way", problem_->limits.least_speed_m_s,
@@ -322,7 +321,7 @@ Result<void> RunPlanner::check_feasible() const {
                     std::sqrt(bound ? *lowest : fast), bound ? bend : where));
   }
   // Which end speed would do: the one that the other end's speed can just reach.
-  SpeedGrid open = *grid_;
+  SpeedGrid open = grid;
   open.end = open.ceiling.back();
   const SpeedEnvelope reach = speed_envelope(open);
   if (reach.fastest.front() >= open.start * (1 - 1e-9)) {
@@ -334,16 +333,16 @@ Result<void> RunPlanner::check_feasible() const {
     }
   }
   const double least_end =
-      std::sqrt(std::max(0.0, grid_->start - 2 * grid_->acceleration_limit * run_->length()));
+      std::sqrt(std::max(0.0, grid.start - 2 * grid.acceleration_limit * run_->length()));
   if (end_ < least_end) {
     return fail(
         Fault::infeasible, "end_speed_m_s",
         "is " + number(end_) + ", the way is too short to brake: at least " + number(least_end) + " remains");
   }
-  open.end = grid_->end;
+  open.end = grid.end;
   open.start = 0;
   const SpeedEnvelope back = speed_envelope(open);
-  SpeedGrid from_anywhere = *grid_;
+  SpeedGrid from_anywhere = grid;
   from_anywhere.start = from_anywhere.ceiling.front();
   const double most_start = std::sqrt(speed_envelope(from_anywhere).fastest.front());
   if (start_ > most_start) {
@@ -541,7 +540,7 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
 }
 
 double RunPlanner::shortest_s() {
-  if (grid_) return fastest_motion().solution.duration_s;
+  if (solver_) return fastest_motion().solution.duration_s;
   if (shortest_s_ == 0 && motion_) shortest_s_ = motion_->shortest_s();
   return shortest_s_;
 }
@@ -553,42 +552,42 @@ double RunPlanner::shortest_s() {
 const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
   if (fastest_) return *fastest_;
   constexpr double unimportant = 1e5;  // times the mean power
-  FastMotion fastest;
-  std::vector<double> nodes = fastest_nodes_;
-  SpeedGrid grid = grid_over(nodes);
-  SpeedEnvelope envelope = speed_envelope(grid);
-  if (!envelope.feasible) nodes = nodes_, grid = *grid_, envelope = *envelope_;
-  const auto keep = [&](const std::vector<double>& z, double duration_s) {
-    fastest.nodes = nodes;
-    fastest.solution.z = z, fastest.solution.duration_s = duration_s;
-  };
-  keep(envelope.fastest, envelope.shortest_s);
-  std::vector<double> start;
-  for (int round = 0; round <= most_rounds && envelope.feasible; ++round) {
+  FastMotion fastest{fastest_nodes_, {}};
+  auto solver = std::make_unique<SpeedSolver>(grid_over(fastest.nodes));
+  if (!solver->envelope().feasible)
+    fastest.nodes = nodes_, solver = std::make_unique<SpeedSolver>(solver_->grid());
+  std::vector<double> nodes = fastest.nodes, start;
+  fastest.solution.z = solver->envelope().fastest,
+  fastest.solution.duration_s = solver->envelope().shortest_s;
+  bool motors_bind = false;
+  for (int round = 0; round <= most_rounds && (motors_bind || solver->envelope().feasible); ++round) {
+    const SpeedGrid& grid = solver->grid();
+    if (motors_bind) {
+      solver->start_from(start);
+    } else {
+      start = solver->envelope().fastest;
+      motors_bind =
+          duration_of(grid, start) > duration_of(grid, fastest_without_motors(grid)) * (1 + coarse_tolerance);
+    }
     SpeedSolution s;
-    s.z = envelope.fastest, s.duration_s = envelope.shortest_s;
+    s.z = start, s.duration_s = duration_of(grid, start);
     std::vector<double> lost_s(grid.cells(), 0);
-    if (s.duration_s > duration_of(grid, fastest_without_motors(grid)) * (1 + coarse_tolerance)) {
-      SpeedSolver solver(grid, envelope);
-      if (round > 0) solver.start_from(start);
-      const double mean_w = sum_of(solver.costs_j(envelope.fastest, 0)) / envelope.shortest_s,
+    if (motors_bind) {
+      const double mean_w = sum_of(solver->costs_j(start, 0)) / s.duration_s,
                    price_w = unimportant * std::max(std::fabs(mean_w), 1e-3);
-      s = solver.solve(price_w, coarse_tolerance);
+      s = solver->solve(price_w, coarse_tolerance);
       if (!s.converged) break;
       for (std::size_t k = 0; k < s.ends_j.size(); ++k) lost_s[k] += s.ends_j[k] / price_w;
     }
-    keep(s.z, s.duration_s);
-    fastest.solution.binding = s.binding;
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
     const double most_s = time_tolerance * s.duration_s;
     const std::vector<double> parts = least_parts(grid, s.z, 1);
+    fastest.nodes = nodes, fastest.solution = std::move(s);
     if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
-    std::vector<double> finer = split(nodes, lost_s, 0.8 * most_s, parts);
-    start = resampled(nodes, s.z, finer);
-    nodes = std::move(finer);
-    grid = grid_over(nodes);
-    envelope = speed_envelope(grid);
+    nodes = split(fastest.nodes, lost_s, 0.8 * most_s, parts);
+    start = resampled(fastest.nodes, fastest.solution.z, nodes);
+    solver = std::make_unique<SpeedSolver>(grid_over(nodes));
   }
   fastest.solution.cost_j = sum_of(driven_j(fastest.nodes, fastest.solution.z));
   return fastest_.emplace(std::move(fastest));
@@ -601,7 +600,7 @@ std::optional<double> RunPlanner::cruise_speed(double price_w) {
     task.value_of_time_w = price_w;
     return std::min(best_speed_of(task), std::sqrt(ceiling_at(0)));
   }
-  if (!motion_ && !grid_) find_motion();
+  if (!motion_ && !solver_) find_motion();
   if (!motion_) return {};
   return motion_->cruise_speed(price_w);
 }
@@ -617,7 +616,7 @@ std::optional<RestMotion> RunPlanner::to_peak(double peak, double price_w) {
         return RestMotion{line.distance(), line.duration_s(), line.energy_j()};
     }
   }
-  if (!motion_ && !grid_) find_motion();
+  if (!motion_ && !solver_) find_motion();
   if (!motion_) return {};
   return motion_->to_peak(peak, price_w);
 }
@@ -697,22 +696,23 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
   if (stop.stop_requested()) return stopped();
   if (!std::isfinite(price_w)) return fastest();
   if (auto answer = closed_form(price_w)) return std::move(*answer);
-  if (uniform_ && !motion_ && !grid_) find_motion();
+  if (uniform_ && !motion_ && !solver_) find_motion();
   if (motion_) {
     TRY_ASSIGN(SteppedMotion motion, motion_->solve(price_w));
     return answer_of(std::move(motion));
   }
-  if (!grid_) TRY(build_grid());
+  if (!solver_) TRY(build_grid());
   TRY_ASSIGN(const SpeedSolution solution, solve_grid(price_w, stop));
   return answer_of(solution, nodes_, price_w);
 }
 
 Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_token& stop) {
-  if (!grid_) {
+  if (!solver_) {
     auto answer = solve(price_w, stop);
-    if (!grid_) return answer;
+    if (!solver_) return answer;
   }
-  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
+  if (const double standing = standing_power_w(solver_->grid()) + price_w; !(standing > 0))
+    return endless(standing);
   const SpeedSolution& s = solve_rough_grid(price_w, stop);
   if (!s.converged) return solve(price_w, stop);
   RunAnswer answer;
@@ -725,21 +725,20 @@ Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_toke
 
 const SpeedSolution& RunPlanner::solve_rough_grid(double price_w, const std::stop_token& stop) {
   if (price_w == rough_price_w_) return rough_;
-  if (!rough_solver_ && !solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
   rough_ = (rough_solver_ ? rough_solver_ : solver_)->solve(price_w, coarse_tolerance, stop);
   rough_price_w_ = price_w;
   return rough_;
 }
 
 Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
-  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
+  if (const double standing = standing_power_w(solver_->grid()) + price_w; !(standing > 0))
+    return endless(standing);
   SpeedSolution s =
       refined_ ? solver_->solve(price_w, fine_tolerance, stop) : solve_rough_grid(price_w, stop);
   if (refined_ && !s.converged) {
     // Another price of time may need other nodes.
     refined_ = false;
     build(rough_nodes_);
-    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
     s = solve_rough_grid(price_w, stop);
   }
   int iterations = s.iterations;
@@ -751,23 +750,21 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     lost = lost_j(s, driven, price_w);
     const double most = lost_tolerance * std::fabs(s.cost_j);
     const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
-    const std::vector<double> parts = least_parts(*grid_, s.z, refined_ ? 1 : 2);
+    const std::vector<double> parts = least_parts(solver_->grid(), s.z, refined_ ? 1 : 2);
     if (refined_ && (grown || (sum_of(lost) <= most && std::ranges::max(parts) == 1))) break;
     const std::vector<double> coarse_nodes = nodes_;
     const auto rebuild = [&](std::vector<double> onto) {
       const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
       if (!rough_solver_) {
         rough_nodes_ = coarse_nodes;
-        rough_grid_ = std::move(grid_), rough_envelope_ = std::move(envelope_);
         rough_solver_ = std::move(solver_);
       }
       build(std::move(onto));
-      solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
       solver_->start_from(start);
     };
     const auto solved_on = [&](std::vector<double> onto) {
       rebuild(std::move(onto));
-      return envelope_->feasible ? solver_->solve(price_w, fine_tolerance, stop) : SpeedSolution{};
+      return solver_->solve(price_w, fine_tolerance, stop);
     };
     const auto stands = [](const SpeedSolution& of) { return of.converged && of.residual < most_residual; };
     SpeedSolution finer = solved_on(
@@ -823,9 +820,9 @@ std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector
                                        double price_w) const {
   std::vector<double> lost = driven;
   const std::vector<double> reckoned = solver_->costs_j(s.z, price_w),
-                            corners_s = lost_at_corners_s(*grid_, s.z);
+                            corners_s = lost_at_corners_s(solver_->grid(), s.z);
   for (std::size_t k = 0; k < lost.size(); ++k) {
-    const double time_j = price_w * grid_->step[k] / mean_speed(s.z[k], s.z[k + 1]);
+    const double time_j = price_w * solver_->grid().step[k] / mean_speed(s.z[k], s.z[k + 1]);
     lost[k] = std::max(0.0, lost[k] + time_j - reckoned[k]) + price_w * corners_s[k] +
               (s.ends_j.empty() ? 0 : s.ends_j[k]);
   }
@@ -859,7 +856,7 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double
 }
 
 Result<RunAnswer> RunPlanner::fastest() {
-  if (uniform_ && !motion_ && !grid_) find_motion();
+  if (uniform_ && !motion_ && !solver_) find_motion();
   if (motion_) {
     auto motion = motion_->fastest();
     if (!motion)
@@ -867,7 +864,7 @@ Result<RunAnswer> RunPlanner::fastest() {
                   "is the shortest time, which needs a limit of acceleration");
     return answer_of(std::move(*motion));
   }
-  if (!grid_) TRY(build_grid());
+  if (!solver_) TRY(build_grid());
   const FastMotion& fast = fastest_motion();
   RunAnswer answer = answer_of(fast.solution, fast.nodes, 0);
   answer.discretisation_j = 0;  // that of the last solution, at another price

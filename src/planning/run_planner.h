@@ -61,7 +61,7 @@ class RunPlanner {
 
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
-  bool on_grid() const { return grid_ != nullptr; }
+  bool on_grid() const { return solver_ != nullptr; }
   // Of all grids that it holds, each of some hundred bytes.
   std::size_t nodes() const;
   double shortest_s();
@@ -123,13 +123,9 @@ class RunPlanner {
   std::unique_ptr<UniformMotion> motion_;           // of a uniform run, where wanted
   std::vector<double> nodes_;
   std::vector<double> fastest_nodes_;  // that the search for the fastest motion begins with
-  std::unique_ptr<SpeedGrid> grid_;    // the solver refers to them
-  std::unique_ptr<SpeedEnvelope> envelope_;
   std::unique_ptr<SpeedSolver> solver_;
   // The first of them, once there are finer ones, and its last solution.
   std::vector<double> rough_nodes_;
-  std::unique_ptr<SpeedGrid> rough_grid_;
-  std::unique_ptr<SpeedEnvelope> rough_envelope_;
   std::unique_ptr<SpeedSolver> rough_solver_;
   double rough_price_w_ = unlimited;
   SpeedSolution rough_;

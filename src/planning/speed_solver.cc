@@ -76,11 +76,10 @@ void shorten(double value, double change, double& step) {
 
 }  // namespace
 
-SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
-    : grid_(grid), envelope_(envelope), floor_(floor_profile(grid)) {
-  const std::size_t n = grid.cells();
-  assert(n >= 2 && grid.ceiling.size() == n + 1);
-  set_return(grid.electric.down);
+SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_profile(grid_)) {
+  const std::size_t n = grid_.cells();
+  assert(n >= 2 && grid_.ceiling.size() == n + 1);
+  set_return(grid_.electric.down);
   cells_.resize(n);
   for (auto* v : {&z_, &trial_, &ceiling_multiplier_, &floor_multiplier_, &gradient_, &stationarity_,
                   &diagonal_, &off_, &magnitude_, &pivot_, &lower_, &step_}) {
@@ -88,15 +87,15 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
-  for (const WheelLoads& loads : grid.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
-  const std::vector<double> fastest = fastest_without_motors(grid);
+  for (const WheelLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
+  const std::vector<double> fastest = fastest_without_motors(grid_);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = 0;
-    if (std::isfinite(grid.acceleration_limit)) mask = 3;
+    if (std::isfinite(grid_.acceleration_limit)) mask = 3;
     // A bound is left out where no speed and acceleration inside the others can reach it.
     const double v = std::sqrt(std::max(fastest[k], fastest[k + 1]));
     for (const std::size_t end : {0u, 1u}) {
-      const Reachable may = reachable(grid, grid.load(k, end), v, 0.99);
+      const Reachable may = reachable(grid_, grid_.load(k, end), v, 0.99);
       for (const std::size_t s : {0u, 1u}) {
         for (const unsigned sign : {0u, 1u}) {
           if (may.torque[s][sign]) mask |= at_both_ends << (bound_of(0, s, false) + sign);
@@ -110,6 +109,11 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
   bound_states_.resize(first_bound_.back());
   bound_total_ = 2 * (n - 1) + bound_states_.size();
+}
+
+const SpeedEnvelope& SpeedSolver::envelope() {
+  if (!envelope_) envelope_ = speed_envelope(grid_);
+  return *envelope_;
 }
 
 void SpeedSolver::set_return(double down) {
@@ -390,20 +394,21 @@ void SpeedSolver::solve_step() {
 
 // Between the slowest and the fastest profile of the envelope, near the cruising speed that balances idle
 // power and viscosity.
-std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) const {
+std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   const std::size_t n = grid_.cells();
   const Electric& e = grid_.electric;
   // Both profiles may press against the same bound; the lower one is drawn with less acceleration.
-  std::vector<double> slowest = envelope_.slowest;
+  const std::vector<double>& fastest = envelope().fastest;
+  std::vector<double> slowest = envelope().slowest;
   if (grid_.start > 0 || grid_.end > 0) {
     for (double part : {0.3, 0.6, 0.8, 0.9, 0.97, 0.99, 0.999}) {
       slowest = slowest_profile(grid_, part * grid_.acceleration_limit);
       bool below = true;
-      for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < envelope_.fastest[k];
+      for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < fastest[k];
       if (below) break;
     }
   }
-  const double top = *std::max_element(envelope_.fastest.begin(), envelope_.fastest.end());
+  const double top = *std::max_element(fastest.begin(), fastest.end());
   double standing = idle_, viscous = 1e-300, losses = 0;
   for (std::size_t s : {0u, 1u}) {
     const dynamics::QuadraticPower p = motor_power(e, s, grid_.load(n / 2)[s]);
@@ -426,7 +431,7 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) con
   double share = wanted.value_or(std::clamp(standing / viscous / top, 0.02, 0.85));
   for (int attempt = 0; attempt < 40; ++attempt) {
     for (std::size_t k = 1; k < n; ++k) {
-      const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * slowest[k]));
+      const double top_here = std::min(fastest[k], std::max(gentle[k], 2 * slowest[k]));
       z[k] = slowest[k] + share * (top_here - slowest[k]);
     }
     if (inside(z)) break;
@@ -631,7 +636,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
   if (!started_ && nearest != way_.rend()) z_ = nearest->z, gap = nearest->gap, started_ = true;
   SpeedSolution best;
   if (started_) best = descend(price_w, gap, tolerance, stop);
-  if (best.converged || stop.stop_requested()) return best;
+  if (best.converged || stop.stop_requested() || !envelope().feasible) return best;
   std::vector<Passed> way;
   for (const std::optional<double> share : {std::optional<double>{}, {0.03}, {0.9}}) {
     if (share && !scrubs_) break;
@@ -646,7 +651,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
       best = std::move(found), way = std::move(way_);
   }
   way_ = std::move(way);
-  if (best.z.empty()) z_ = envelope_.fastest, finish(best, price_w);
+  if (best.z.empty()) z_ = envelope().fastest, finish(best, price_w);
   return best;
 }
 

@@ -36,7 +36,10 @@ struct SpeedSolution {
 // (thesis, minimum energy).
 class SpeedSolver {
  public:
-  SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope);
+  explicit SpeedSolver(SpeedGrid grid);
+
+  const SpeedGrid& grid() const { return grid_; }
+  const SpeedEnvelope& envelope();
 
   // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
   // earlier the more the price has changed. Where scrub makes the problem not convex, a first solve also
@@ -106,7 +109,7 @@ class SpeedSolver {
   void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
-  std::vector<double> initial_point(std::optional<double> share = {}) const;
+  std::vector<double> initial_point(std::optional<double> share = {});
   void set_return(double down);
   void finish(SpeedSolution& solution, double price_w);
   SpeedSolution descend(double price_w, double gap, double tolerance, const std::stop_token& stop);
@@ -125,9 +128,9 @@ class SpeedSolver {
   void follow_kinks(Cell& cell, double dv, double dq) const;
   std::array<bool, bound_count> binding(double unit_j) const;
 
-  const SpeedGrid& grid_;
-  const SpeedEnvelope& envelope_;
-  std::vector<double> floor_;  // of z
+  const SpeedGrid grid_;
+  std::optional<SpeedEnvelope> envelope_;  // once asked for
+  std::vector<double> floor_;              // of z
   double idle_ = 0, smoothing_ = 0, gear_smoothing_ = 0;
   double mean_slope_ = 1, half_jump_ = 0;
   std::vector<std::uint32_t> bounds_;     // mask of bounds that can bind, per cell
