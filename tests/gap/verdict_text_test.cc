@@ -108,9 +108,10 @@ TEST(VerdictText, ReportsReasonsWithoutEffects) {
   d.detectable_share = 0.03;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("effect of less than 3\u00a0% of the power")));
   d.power_absolute_relative = std::nan("");
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("data are insufficient")));
   d.power = PowerSource::none;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("No power was recorded")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("the torques of the motors alone")));
+  d.motor_channels = false;
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("the voltages of the motors alone")));
 }
 
 TEST(VerdictText, NamesBetterBaseline) {

@@ -56,18 +56,10 @@ class Reasons {
   explicit Reasons(const Diagnosis& d) : d_(d) {}
 
   std::vector<std::string> all(bool worse_than_regression) {
-    if (!d_.motion_known) {
-      say("the recordings have less usable motion of the wheels than the 20 s that a diagnosis needs: they "
-          "are shorter, or their checks exclude it");
-      return said_;
-    }
     const bool nothing = d_.effects.empty() && d_.verdict == Verdict::inconclusive;
-    if (!std::isfinite(d_.power_absolute_relative) && nothing) {
-      if (d_.motor_channels && d_.power == PowerSource::none)
-        say("no power was recorded, and the torques alone do not determine the cause");
-      else
-        say("the data are insufficient: too few seconds of motion, or neither power nor the motors' voltage "
-            "or current");
+    if (d_.power == PowerSource::none && nothing) {
+      say("no power was recorded, and the {} of the motors alone do not determine the cause",
+          d_.motor_channels ? "torques" : "voltages");
       return said_;
     }
     if (d_.verdict == Verdict::none) return said_;
