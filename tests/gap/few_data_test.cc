@@ -78,6 +78,26 @@ TEST(FewData, NamesReadingsOfAnotherPack) {
               ElementsAre(HasSubstr("without the readings of battery_voltage, which the checks")));
 }
 
+// Voltages show no load of the battery of any size.
+TEST(FewData, StatesNoImpossibleLimit) {
+  telemetry::Recording r = rolling(60, false);
+  for (std::size_t k = 0; k < r.samples.size(); ++k) {
+    const double phase = 0.02 * static_cast<double>(k);
+    r.samples[k].wheel_velocity_rad_s = {9 + 6 * std::sin(3 * phase), 9 + 6 * std::sin(3 * phase)};
+    const double voltage_v = std::fmod(phase, 0.6) < 0.3 ? 4 : -4;
+    r.samples[k].motor_voltage_v = {voltage_v, voltage_v};
+  }
+  const auto set = telemetry::make_recording_set("r", {r});
+  ASSERT_TRUE(set);
+  const auto d = diagnose_shipped(*set);
+  ASSERT_TRUE(d);
+  EXPECT_EQ(d->verdict, Verdict::inconclusive);
+  EXPECT_FALSE(d->detectable_share <= 1);
+  ASSERT_FALSE(d->reasons.empty());
+  EXPECT_THAT(d->reasons.front(), ::testing::HasSubstr("the voltages of the motors alone"));
+  for (const std::string& reason : d->reasons) EXPECT_LT(reason.size(), 120u) << reason;
+}
+
 TEST(FewData, RejectsShortMission) {
   const auto set = telemetry::make_recording_set("r", {rolling(3, true)});
   ASSERT_FALSE(set);

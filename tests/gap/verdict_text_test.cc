@@ -108,14 +108,21 @@ TEST(VerdictText, ReportsReasonsWithoutEffects) {
   d.detectable_share = 0.03;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("effect of less than 3\u00a0% of the power")));
   d.power_absolute_relative = std::nan("");
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("data are insufficient")));
   d.power = PowerSource::none;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("No power was recorded")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("the torques of the motors alone")));
   d.motor_channels = false;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("needs battery_voltage with battery_current")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("the voltages of the motors alone")));
+}
+
+TEST(VerdictText, StatesMissingData) {
+  Diagnosis d;
+  EXPECT_THAT(missing_data(d, false), HasSubstr("less usable motion"));
+  EXPECT_THAT(missing_data(d, true), HasSubstr("too few seconds of motion with power"));
+  d.power = PowerSource::none;
+  EXPECT_THAT(missing_data(d, true), HasSubstr("needs battery_voltage with battery_current"));
   d.checks = {{"impossible_readings", "battery_voltage", 601, {}, "", false},
               {"wheel_velocity_scale", "wheel_velocity", 2, {}, "", true}};
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("without the readings of battery_voltage, which")));
+  EXPECT_THAT(missing_data(d, true), HasSubstr("without the readings of battery_voltage, which"));
 }
 
 TEST(VerdictText, NamesBetterBaseline) {

@@ -94,7 +94,7 @@ class Diagnoser {
       const auto settled = [&](std::size_t side) { return w.moving[side] || w.resting[side]; };
       return w.reading || (settled(0) && settled(1));
     };
-    d_.motion_known =
+    motion_known_ =
         static_cast<std::size_t>(std::ranges::count_if(windows_, moves)) >= posterior::fewest_windows;
     d_.motor_channels = readings_.motor_currents;
     const auto known = [](double p) { return std::isfinite(p); };
@@ -108,16 +108,16 @@ class Diagnoser {
       d_.notes.emplace_back(
           "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
           "robot file's windings need for them.");
-    return d_.motion_known && (d_.power == PowerSource::battery || readings_.motor_currents ||
+    return motion_known_ && (d_.power == PowerSource::battery || readings_.motor_currents ||
                                from_motion_of(readings_).voltage);
   }
 
   Diagnosis nothing_to_judge() {
     d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
     // Without power another drive with the same channels is of no use.
-    if (!d_.motion_known || d_.power != PowerSource::none) d_.next_drive = first_drives(robot_);
+    if (!motion_known_ || d_.power != PowerSource::none) d_.next_drive = first_drives(robot_);
     d_.refusal = "nothing was found that a robot file could take";
-    d_.reasons = reasons_for(d_, false);
+    d_.reasons.push_back(missing_data(d_, motion_known_));
     return std::move(d_);
   }
 
@@ -277,6 +277,7 @@ class Diagnoser {
   const Progress& progress_;
   std::vector<dynamics::ActiveEffect> adopted_;
   windows::Readings readings_;
+  bool motion_known_ = false;  // for long enough
   std::vector<Window> windows_;
   std::vector<double> power_w_, model_w_;  // of windows_: measured, and by the robot file
   std::unique_ptr<posterior::Fit> fit_;

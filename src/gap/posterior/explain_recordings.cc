@@ -30,15 +30,15 @@ std::vector<DiagnosedParameter> parameters_of(const Hypothesis& h, const Eigen::
 }
 
 // Smallest share of power at which these data show `detected_part` of the effects, at `detected_sd` of their
-// estimates.
+// estimates; infinite above the whole power.
 double detectable_share(const Fit& fit, const View& view) {
   std::vector<double> shares;
   for (std::size_t h = 0; h < fit.prior->size(); ++h) {
     const double share = fit.equations.share[ix(fit.catalogue.first_column(h))];
     if (share > 0) shares.push_back(detected_sd * share / std::sqrt(std::max(view.precision(h), 1e-300)));
   }
-  return shares.empty() ? std::numeric_limits<double>::infinity()
-                        : statistics::quantile(shares, detected_part);
+  const double share = shares.empty() ? 2 : statistics::quantile(shares, detected_part);
+  return share > 1 ? std::numeric_limits<double>::infinity() : share;
 }
 
 // The strengths of one effect in one shape, and the parts of a slope along two headings, as one.
@@ -353,7 +353,9 @@ class Explainer {
     if (v == Verdict::none && a_.detectable > detectable) {
       v = Verdict::inconclusive;
       a_.reasons.push_back(
-          fmt::format("these data show gaps from {:.1f} % of power on", 100 * a_.detectable));
+          std::isfinite(a_.detectable)
+              ? fmt::format("these data show gaps from {:.1f} % of power on", 100 * a_.detectable)
+              : "many effects of any size do not show in these data");
     }
     if (v == Verdict::none && gap_is_left()) {
       v = Verdict::inconclusive;

@@ -172,8 +172,6 @@ struct Diagnosis {
   std::size_t missions = 0, samples = 0;
   std::vector<std::string> notes;  // missions joined or left out, messages that could not be read
   bool motor_channels = true;      // false: estimated from battery power and motion alone
-  bool motion_known =
-      true;  // false: the wheels' speeds were not recorded, are too few, or are contradicted by other data
   PowerSource power = PowerSource::battery;
   double energy_relative = 0;          // (E_measured - E_model) / E_measured
   double power_absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|

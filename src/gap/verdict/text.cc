@@ -57,20 +57,10 @@ class Reasons {
   explicit Reasons(const Diagnosis& d) : d_(d) {}
 
   std::vector<std::string> all(bool worse_than_regression) {
-    if (!d_.motion_known) {
-      say("the recordings have less usable motion of the wheels than the 20 s that a diagnosis needs: they "
-          "are shorter, their checks exclude it, or no wheel turns faster than {} rad/s",
-          windows::moving_rad_s);
-      return said_;
-    }
     const bool nothing = d_.effects.empty() && d_.verdict == Verdict::inconclusive;
-    if (!std::isfinite(d_.power_absolute_relative) && nothing) {
-      if (d_.power != PowerSource::none)
-        say("the data are insufficient: too few seconds of motion with power");
-      else if (d_.motor_channels)
-        say("no power was recorded, and the torques alone do not determine the cause");
-      else
-        no_power();
+    if (d_.power == PowerSource::none && nothing) {
+      say("no power was recorded, and the {} of the motors alone do not determine the cause",
+          d_.motor_channels ? "torques" : "voltages");
       return said_;
     }
     if (d_.verdict == Verdict::none) return said_;
@@ -112,21 +102,6 @@ class Reasons {
   template <class... Args>
   void say(fmt::format_string<Args...> text, Args&&... args) {
     said_.push_back(sentence(fmt::format(text, std::forward<Args>(args)...)));
-  }
-
-  // Another drive with the same channels would be of no use: states what is missing.
-  void no_power() {
-    std::string excluded;
-    for (const Check& check : d_.checks)
-      if ((check.contradicted || check.id == "impossible_readings") && check.channel != "wheel_velocity")
-        excluded += (excluded.empty() ? "" : ", ") + check.channel;
-    if (excluded.empty())
-      say("neither power nor the motors' voltage or current was recorded: a diagnosis needs battery_voltage "
-          "with battery_current, or motor_voltage, or motor_current");
-    else
-      say("no power is left without the readings of {}, which the checks exclude: compare their unit and the "
-          "robot file with the robot",
-          excluded);
   }
 
   void shrinkage() {
@@ -204,6 +179,26 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
 
 std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   return Reasons(d).all(worse);
+}
+
+std::string missing_data(const Diagnosis& d, bool motion_known) {
+  if (!motion_known)
+    return fmt::format(
+        "The recordings have less usable motion of the wheels than the 20 s that a diagnosis needs: they are "
+        "shorter, their checks exclude it, or no wheel turns faster than {} rad/s.",
+        windows::moving_rad_s);
+  if (d.power != PowerSource::none) return "There are too few seconds of motion with power.";
+  std::string excluded;
+  for (const Check& check : d.checks)
+    if ((check.contradicted || check.id == "impossible_readings") && check.channel != "wheel_velocity")
+      excluded += (excluded.empty() ? "" : ", ") + check.channel;
+  if (excluded.empty())
+    return "Neither power nor the motors' voltage or current was recorded: a diagnosis needs battery_voltage "
+           "with battery_current, or motor_voltage, or motor_current.";
+  return fmt::format(
+      "No power is left without the readings of {}, which the checks exclude: compare their unit and the "
+      "robot file with the robot.",
+      excluded);
 }
 
 }  // namespace joulecast::gap

@@ -21,4 +21,7 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
 // reasons.
 std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_regression);
 
+// What recordings lack that cannot be diagnosed. `motion_known`: the wheels' motion is, for long enough.
+std::string missing_data(const Diagnosis& diagnosis, bool motion_known);
+
 }  // namespace joulecast::gap
