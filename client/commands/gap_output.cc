@@ -88,16 +88,18 @@ void print_gap(const Json& d) {
   } else if (member_at(d, "gap/energy_relative").is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
-    fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %){}\n",
-               percent_at(d, "gap/energy_relative"), percent_at(d, "gap/power_absolute_relative"),
-               percent_at(d, "gap/noise_floor"),
+    const Json& noise = member_at(d, "gap/noise_floor");
+    fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} %{}{}\n", percent_at(d, "gap/energy_relative"),
+               percent_at(d, "gap/power_absolute_relative"),
+               noise.is_number() ? fmt::format(" (noise floor {:.1f} %)", 100 * noise.get<double>()) : "",
                d["power"] == gap::name_of(gap::PowerSource::motors)
                    ? ", of the motors' power with the file's idle power"
                    : "");
   }
   std::string others;
+  const char* own = d["power"] == gap::name_of(gap::PowerSource::motors) ? "motor_power" : "battery_power";
   for (const auto& [name, gap] : member_at(d, "channels").items())
-    if (name != "battery_power")
+    if (name != own)
       others += fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
                             percent_at(gap, "absolute_relative"), percent_at(gap, "noise_floor"));
   if (!others.empty()) fmt::print("other readings: {}\n", others);
@@ -109,7 +111,8 @@ void print_terms(const Json& d) {
   const Json& baseline = member_at(d, "baseline");
   if (!baseline.is_object()) return;
   constexpr auto row = "  {:<14}{:>20}{:>13}{:>13}  {}\n";
-  fmt::print(row, "power by term", "in the data", "robot file", "explained", "unit");
+  if (!baseline["terms"].empty())
+    fmt::print(row, "power by term", "in the data", "robot file", "explained", "unit");
   for (const auto& [name, term] : baseline["terms"].items()) {
     fmt::print(row, name, figure(term, "value") + plus_minus(term["sd"]), figure(term, "model"),
                figure(term, "explained"), text(term["unit"]));

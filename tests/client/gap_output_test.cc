@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "gap/verdict/diagnosis_json.h"
@@ -29,6 +30,18 @@ TEST(GapOutput, OmitsChannelInContradictedMissions) {
   d.checks[0].few_missions = {2};
   EXPECT_NE(printed(gap::diagnosis_to_json(d)).find("It is reversed. It is not used there."),
             std::string::npos);
+}
+
+TEST(GapOutput, OmitsUnknownNoiseFloor) {
+  gap::Diagnosis d = made_diagnosis();
+  d.power = gap::PowerSource::motors;
+  d.noise_floor = std::nan("");
+  d.channels = {{"motor_power", 0.202, d.noise_floor}};
+  d.baseline->terms.clear();
+  const std::string text = printed(gap::diagnosis_to_json(d));
+  EXPECT_NE(text.find("absolute power 20.2 %, of the motors' power"), std::string::npos) << text;
+  EXPECT_EQ(text.find("nan"), std::string::npos) << text;
+  EXPECT_EQ(text.find("power by term"), std::string::npos) << text;
 }
 
 TEST(GapOutput, PrintsSectionsInOrder) {

@@ -85,9 +85,11 @@ Eigen::VectorXd regressed(const Data& d, const TermColumns& terms, std::span<con
     if (weights[of_row[r]] != 0) trained.push_back(ix(r)), block.push_back(of_row[r]);
   }
   const Eigen::VectorXd measured = d.rows.measured_w();
-  return terms.x * statistics::robust_regression(terms.x(trained, Eigen::all), measured(trained), block,
-                                                 terms.nonnegative)
-                       .coefficients;
+  Eigen::MatrixXd x = terms.x(trained, Eigen::all);
+  // A term that these rows contain by rounding alone has no coefficient.
+  for (Eigen::Index k = 0; k < x.cols(); ++k)
+    if (x.col(k).norm() < rounding * terms.x.col(k).norm()) x.col(k).setZero();
+  return terms.x * statistics::robust_regression(x, measured(trained), block, terms.nonnegative).coefficients;
 }
 
 // Power by effects and calibration, for all rows of power: a step from the point of the walk.

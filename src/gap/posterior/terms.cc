@@ -14,7 +14,6 @@ namespace joulecast::gap::posterior {
 namespace {
 
 constexpr std::size_t fewest_term_rows = 30;
-constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
 // Terms that are reported as one.
 using TermGroup = std::vector<Eigen::Index>;

@@ -99,5 +99,25 @@ TEST(AtBound, IsTrueNearEndsOnly) {
   EXPECT_FALSE(at_bound(h, -2));
 }
 
+// Groups in which the speed changes by rounding alone: v a of one block says nothing of another.
+TEST(PlainRegression, IgnoresTermsOfRounding) {
+  Data d;
+  d.group = {0};
+  d.robot.kinematics.wheel_radius_m = 1;
+  for (std::size_t r = 0; r < 40; ++r) {
+    Window w;
+    w.block = r % 2;
+    const double speed = 1 + 0.1 * static_cast<double>(r / 2);
+    w.speed_rad_s = {speed, speed};
+    const double a = w.block == 0 ? 1.0 : 1e-16;
+    w.acceleration_rad_s2 = {a, a};
+    d.rows.instants.push_back(w);
+    d.rows.first.push_back(r + 1);
+    d.rows.power_w.push_back(10 + 5 * speed + (r % 4 < 2 ? 0.1 : -0.1));
+  }
+  const Eigen::VectorXd predicted = plain_regression(d, std::vector<double>{0, 1});
+  EXPECT_LT((predicted - d.rows.measured_w()).cwiseAbs().maxCoeff(), 1) << predicted.transpose();
+}
+
 }  // namespace
 }  // namespace joulecast::gap::posterior
