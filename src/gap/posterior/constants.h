@@ -98,6 +98,6 @@ inline constexpr double shown_part = 0.002;             // of the power: smalles
 inline constexpr double term_sd = 3, term_part = 0.02;  // smallest reported sum; of the power
 inline constexpr double same_form = 0.97;               // R^2 of an effect's power by the terms of a sum
 inline constexpr double equivalent = 0.01;              // of the power: the parameter takes the sum
-inline constexpr double rounding = 1e-9;  // of a term in all rows: what is smaller is zero
+inline constexpr double rounding = 1e-9;                // of a term in all rows: what is smaller is zero
 
 }  // namespace joulecast::gap::posterior
