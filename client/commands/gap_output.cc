@@ -79,6 +79,12 @@ void print_checks(const Json& d) {
                                                                        : " It is not used below."));
 }
 
+// " (noise floor 3.3 %)" of a gap, if it is known.
+std::string in_brackets(const char* words, const Json& gap) {
+  const Json& noise = member_at(gap, "noise_floor");
+  return noise.is_number() ? fmt::format(" ({}{:.1f} %)", words, 100 * noise.get<double>()) : "";
+}
+
 void print_gap(const Json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none) && member_at(d, "channels").empty()) {
     fmt::print("gap: not available without power\n");
@@ -88,20 +94,18 @@ void print_gap(const Json& d) {
   } else if (member_at(d, "gap/energy_relative").is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
-    const Json& noise = member_at(d, "gap/noise_floor");
     fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} %{}{}\n", percent_at(d, "gap/energy_relative"),
-               percent_at(d, "gap/power_absolute_relative"),
-               noise.is_number() ? fmt::format(" (noise floor {:.1f} %)", 100 * noise.get<double>()) : "",
+               percent_at(d, "gap/power_absolute_relative"), in_brackets("noise floor ", d["gap"]),
                d["power"] == gap::name_of(gap::PowerSource::motors)
                    ? ", of the motors' power with the file's idle power"
                    : "");
   }
   std::string others;
-  const char* own = d["power"] == gap::name_of(gap::PowerSource::motors) ? "motor_power" : "battery_power";
+  const bool of_motors = d["power"] == gap::name_of(gap::PowerSource::motors);
   for (const auto& [name, gap] : member_at(d, "channels").items())
-    if (name != own)
-      others += fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
-                            percent_at(gap, "absolute_relative"), percent_at(gap, "noise_floor"));
+    if (name != "battery_power" && !(of_motors && name == "motor_power"))
+      others += fmt::format("{}{} {:.1f} %{}", others.empty() ? "" : ", ", name,
+                            percent_at(gap, "absolute_relative"), in_brackets("", gap));
   if (!others.empty()) fmt::print("other readings: {}\n", others);
 }
 
