@@ -109,7 +109,7 @@ class Diagnoser {
           "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
           "robot file's windings need for them.");
     return motion_known_ && (d_.power == PowerSource::battery || readings_.motor_currents ||
-                               from_motion_of(readings_).voltage);
+                             from_motion_of(readings_).voltage);
   }
 
   Diagnosis nothing_to_judge() {
