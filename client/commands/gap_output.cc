@@ -86,9 +86,11 @@ std::string in_brackets(const char* words, const Json& gap) {
 }
 
 void print_gap(const Json& d) {
-  if (d["power"] == gap::name_of(gap::PowerSource::none) && member_at(d, "channels").empty()) {
+  const bool of_nothing = d["power"] == gap::name_of(gap::PowerSource::none),
+             of_motors = d["power"] == gap::name_of(gap::PowerSource::motors);
+  if (of_nothing && member_at(d, "channels").empty()) {
     fmt::print("gap: not available without power\n");
-  } else if (d["power"] == gap::name_of(gap::PowerSource::none)) {
+  } else if (of_nothing) {
     fmt::print("gap: no power was recorded; diagnosed from {}\n",
                d["motor_channels"] == true ? "torques" : "voltages and motion");
   } else if (member_at(d, "gap/energy_relative").is_null()) {
@@ -96,12 +98,9 @@ void print_gap(const Json& d) {
   } else {
     fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} %{}{}\n", percent_at(d, "gap/energy_relative"),
                percent_at(d, "gap/power_absolute_relative"), in_brackets("noise floor ", d["gap"]),
-               d["power"] == gap::name_of(gap::PowerSource::motors)
-                   ? ", of the motors' power with the file's idle power"
-                   : "");
+               of_motors ? ", of the motors' power with the file's idle power" : "");
   }
   std::string others;
-  const bool of_motors = d["power"] == gap::name_of(gap::PowerSource::motors);
   for (const auto& [name, gap] : member_at(d, "channels").items())
     if (name != "battery_power" && !(of_motors && name == "motor_power"))
       others += fmt::format("{}{} {:.1f} %{}", others.empty() ? "" : ", ", name,

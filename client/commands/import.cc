@@ -112,7 +112,7 @@ bool is_bag(const std::string& path) {
 // The recordings of bags as tables in a folder, converted by deploy/import/bags.cjs.
 class ConvertedBags {
  public:
-  ConvertedBags() { mkdtemp(folder_.data()); }
+  ConvertedBags() = default;
   ConvertedBags(const ConvertedBags&) = delete;
   ConvertedBags& operator=(const ConvertedBags&) = delete;
   ~ConvertedBags() {
@@ -121,6 +121,7 @@ class ConvertedBags {
   }
 
   Result<std::vector<ImportSource>> convert(const ImportOptions& options) {
+    if (mkdtemp(folder_.data()) == nullptr) return unavailable(std::exchange(folder_, {}), errno);
     TRY_ASSIGN(const auto script, converter());
     const Json asked{{"bags", options.tables},
                      {"out", folder_},

@@ -37,8 +37,9 @@ double detectable_share(const Fit& fit, const View& view) {
     const double share = fit.equations.share[ix(fit.catalogue.first_column(h))];
     if (share > 0) shares.push_back(detected_sd * share / std::sqrt(std::max(view.precision(h), 1e-300)));
   }
-  const double share = shares.empty() ? 2 : statistics::quantile(shares, detected_part);
-  return share > 1 ? std::numeric_limits<double>::infinity() : share;
+  constexpr double no_limit = std::numeric_limits<double>::infinity();
+  const double share = shares.empty() ? no_limit : statistics::quantile(shares, detected_part);
+  return share > 1 ? no_limit : share;
 }
 
 // The strengths of one effect in one shape, and the parts of a slope along two headings, as one.
