@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/back_test_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
 #include "client/commands/gap_parts.h"
@@ -81,14 +81,12 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
 
 const described::Table<GapTest>& test_table() {
   using R = energy::RegressionComparison;
-  using M = energy::MissedPower;
-  using described::within;
   static const auto beside =
       described::Table<R>()
           .value("windows", &R::windows, "windows with new readings")
-          .number_or_null("file_missed", within(&R::missed, &M::file), "mean |error| over mean |power| there")
-          .number_or_null("corrected_missed", within(&R::missed, &M::corrected), "with the effects found")
-          .number_or_null("regression_missed", within(&R::missed, &M::regression), "of a linear regression")
+          .number_or_null("file_missed", AT(missed.file), "mean |error| over mean |power| there")
+          .number_or_null("corrected_missed", AT(missed.corrected), "with the effects found")
+          .number_or_null("regression_missed", AT(missed.regression), "of a linear regression")
           .value("regression_wins", &R::regression_wins, "the regression predicts better");
   static const auto table =
       described::Table<GapTest>()

@@ -100,16 +100,11 @@ const described::Table<Requested>& requested_table() {
           .value("robot_id", &R::robot_id, "id of the robot")
           .word(
               "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
-          .value(
-              "mission_id", [](const R& r) -> const std::string& { return r.event.mission_id; },
-              "as in the request")
-          .time(
-              "", [](const R& r) { return r.event.utime_us; },
-              "when the mission begins or ends, by the robot's clock as of its last sample")
-          .number_or_null(
-              "payload_kg", [](const R& r) { return r.event.payload_kg; }, "as in the request")
-          .value(
-              "note", [](const R& r) -> const std::string& { return r.event.note; }, "as in the request");
+          .value("mission_id", AT(event.mission_id), "as in the request")
+          .time("", AT(event.utime_us),
+                "when the mission begins or ends, by the robot's clock as of its last sample")
+          .number_or_null("payload_kg", AT(event.payload_kg), "as in the request")
+          .value("note", AT(event.note), "as in the request");
   return table;
 }
 

@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "describe/input.h"
@@ -241,8 +240,7 @@ const Table<TraceAnswer>& trace_table() {
   static const auto table =
       Table<A>("A mission over time, in columns")
           .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
-          .value(
-              "width_us", [](const A& a) { return a.trace.width_us; }, "length of each span")
+          .value("width_us", AT(trace.width_us), "length of each span")
           .integers("start_utime_us", of_spans(&B::start_utime_us),
                     "start of each span, microseconds since 1970 by the robot's clock")
           .column("covered_s", of_spans(&B::covered_s), "time of each span with telemetry", 6, true)
@@ -331,9 +329,7 @@ Table<TelemetryAnswer> make_telemetry() {
       table.exact(
           name, [k](const A& a) { return numbers_of(a, k); }, words_of(field.key));
   }
-  table.text_or_null(
-      "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
-      described::cursor_words);
+  table.text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
   return table;
 }
 
@@ -369,9 +365,7 @@ const Table<CovariatesAnswer>& covariates_table() {
           .list(
               "covariates", [](const A& a) { return signals::series_of(a.page.changes); },
               "in the order of their first change in the page", series)
-          .text_or_null(
-              "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
-              described::cursor_words);
+          .text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
   return table;
 }
 

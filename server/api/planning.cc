@@ -69,11 +69,10 @@ const described::Table<ProblemRow>& problem_table() {
           .value("field", &Error::field, "field of the request at fault; empty: none")
           .value("message", &Error::message, "the problem in a sentence");
   using R = ProblemRow;
-  static const auto table = Table<R>({}, "problem of a robot without a forecast")
-                                .value("robot_id", &R::robot_id, id_words)
-                                .object(
-                                    "problem", [](const R& r) -> const Error& { return r.error; },
-                                    "the reason why this robot has no forecast", error);
+  static const auto table =
+      Table<R>({}, "problem of a robot without a forecast")
+          .value("robot_id", &R::robot_id, id_words)
+          .object("problem", AT(error), "the reason why this robot has no forecast", error);
   return table;
 }
 

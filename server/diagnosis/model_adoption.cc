@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "answers/json/back_test_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "energy/back_test.h"
 #include "robot/robot_file.h"
