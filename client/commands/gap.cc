@@ -13,7 +13,6 @@
 #include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
-#include "client/commands/gap_parts.h"
 #include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -120,11 +119,9 @@ struct Judged {
 
 Result<Judged> judge_recordings(const GapOptions& options, const telemetry::RecordingSet& recordings,
                                 const robot::RobotModel& robot) {
-  const auto diagnosed = [&] {
-    Progress progress("diagnosing", "%", 100);
-    return gap::diagnose(recordings, robot, progress.shares());
-  };
-  TRY_ASSIGN(auto diagnosis, diagnosed());
+  TRY_ASSIGN(auto diagnosis, with_progress("diagnosing", [&](const gap::Progress& progress) {
+               return gap::diagnose(recordings, robot, progress);
+             }));
   Judged judged{std::move(diagnosis), std::nullopt};
   if (options.test.empty()) return judged;
   const gap::Offer offer = gap::offer_of(judged.diagnosis);
@@ -157,17 +154,10 @@ Result<Exit> gap_of_logs(const GapOptions& options, const robot::RobotModel& rob
   TRY_ASSIGN(const auto judged, judge_recordings(options, recordings, robot));
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged.diagnosis);
   const auto test = judged.test ? test_table().document(*judged.test) : nlohmann::ordered_json();
-  if (options.json) {
-    if (judged.test) document["back_test"] = test;
-    std::printf("%s\n", document.dump(2).c_str());
-  } else {
-    print_diagnosis(document);
-    if (judged.test) print(*judged.test, test, options.unit);
-  }
-  if (!options.report.empty()) {
-    const auto page = report::report_html(document, robot, origin);
-    TRY(write_page(options, page));
-  }
+  if (options.json && judged.test) document["back_test"] = test;
+  show_diagnosis(options, document);
+  if (!options.json && judged.test) print(*judged.test, test, options.unit);
+  TRY(write_page(options, document, robot, origin));
   if (!options.apply.empty()) TRY(apply(options, judged, robot));
   return Exit::ok;
 }
