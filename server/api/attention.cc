@@ -140,11 +140,9 @@ void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding
 // The newest diagnosis of each robot, where it names effects and no model was adopted since.
 Result<void> add_diagnoses(std::map<std::string, std::vector<AttentionReason>>& reasons,
                            const Services& services) {
-  const auto found =
-      services.store.diagnoses({}, std::numeric_limits<std::int64_t>::max(), history::max_page_size);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto found, services.store.diagnoses({}, history::whole_future, history::max_page_size));
   std::set<std::string> seen;
-  for (const history::DiagnosisRecord& d : *found) {
+  for (const history::DiagnosisRecord& d : found) {
     if (d.state != history::DiagnosisState::done || !seen.insert(d.robot_id).second) continue;
     const auto model = services.models.find(d.robot_id);
     const auto summary = nlohmann::json::parse(d.summary_json, nullptr, false);

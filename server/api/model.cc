@@ -103,11 +103,10 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     if (diagnosis.robot_id != robot_id)
       return invalid("/diagnosis_id", "belongs to robot " + diagnosis.robot_id + ", not to " + robot_id);
     // A test does not require a model that can be adopted.
-    Result<server::DiagnosedModel> diagnosed =
-        server::diagnosed_model(services.store, diagnosis, {r.effects, r.force || r.dry_run});
-    if (!diagnosed) return tl::unexpected(std::move(diagnosed.error()));
-    model = std::move(diagnosed->model);
-    adoption.overridden = std::move(diagnosed->overridden);
+    TRY_ASSIGN(server::DiagnosedModel diagnosed,
+               server::diagnosed_model(services.store, diagnosis, {r.effects, r.force || r.dry_run}));
+    model = std::move(diagnosed.model);
+    adoption.overridden = std::move(diagnosed.overridden);
     adoption.origin = history::ModelOrigin::diagnosis;
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
     fitted_on = std::move(diagnosis.fitted_on);

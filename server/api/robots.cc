@@ -250,17 +250,16 @@ Result<Response> check_file(const Services&, const Request& request) {
 
 Result<Response> put(Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  Result<robot::RobotModel> robot = robot::parse_robot(request.body);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
-  if (robot->robot_id != id)
+  TRY_ASSIGN(const robot::RobotModel robot, robot::parse_robot(request.body));
+  if (robot.robot_id != id)
     return invalid("/robot_id",
-                   "is \"" + robot->robot_id + "\", must equal the id in the path, \"" + id + "\"");
+                   "is \"" + robot.robot_id + "\", must equal the id in the path, \"" + id + "\"");
   // The catalogue's bounds are checked before anything is stored.
-  TRY(dynamics::active_effects(*robot));
-  const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
+  TRY(dynamics::active_effects(robot));
+  const std::vector<robot::ReviewFinding> findings = robot::review(robot);
   TRY(robot::plannable(findings));
   RequestChange change(services, request);
-  return change.result(services.adoption.put(*robot, change.answered_by([id, findings](std::int64_t version) {
+  return change.result(services.adoption.put(robot, change.answered_by([id, findings](std::int64_t version) {
     return http::json_response(stored_table().text({id, version, findings}));
   })));
 }

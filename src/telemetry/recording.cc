@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "base/try.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 
@@ -29,10 +30,8 @@ Result<void> write_changes(EventLogWriter& log, const std::string& robot_id,
            message.covariates.size() < signals::max_covariates;
          ++k)
       message.covariates.push_back({changes[k].name, changes[k].value});
-    auto written = encode_covariates(robot_id, message).and_then([&](const std::vector<std::uint8_t>& bytes) {
-      return log.write(message.utime_us, channel, bytes);
-    });
-    if (!written) return written;
+    TRY_ASSIGN(const std::vector<std::uint8_t> bytes, encode_covariates(robot_id, message));
+    TRY(log.write(message.utime_us, channel, bytes));
   }
   return {};
 }
