@@ -142,6 +142,16 @@ Result<void> apply(const GapOptions& options, const Judged& judged, const robot:
   return apply_offer(options, offer, robot);
 }
 
+Result<Exit> gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                                const GapOptions& options, const report::ReportOrigin& origin) {
+  TRY_ASSIGN(const auto groups, gap::groups_of(recordings, options.compare_by));
+  return compare_and_print(
+      [&](const gap::Progress& progress) {
+        return gap::compare_recordings(recordings, groups, robot, progress);
+      },
+      robot, options, origin);
+}
+
 Result<Exit> gap_of_logs(const GapOptions& options, const robot::RobotModel& robot) {
   const auto read = [&] {
     LogProgress progress("reading", options.logs);

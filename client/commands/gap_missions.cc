@@ -6,6 +6,7 @@
 #include "client/files.h"
 #include "client/progress.h"
 #include "client/wrapped.h"
+#include "gap/groups/comparison_json.h"
 #include "gap/runs/runs_json.h"
 
 namespace joulecast::client {
@@ -30,6 +31,16 @@ Result<Exit> compare(const GapOptions& options, const gap::RunSet& runs, const r
 }
 
 }  // namespace
+
+Result<Exit> compare_and_print(const std::function<Result<gap::Comparison>(const gap::Progress&)>& compare,
+                               const robot::RobotModel& robot, const GapOptions& options,
+                               const report::ReportOrigin& origin) {
+  TRY_ASSIGN(const auto comparison, with_progress("comparing", compare));
+  const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
+  show_diagnosis(options, document);
+  TRY(write_page(options, document, robot, origin));
+  return Exit::ok;
+}
 
 std::string run_columns_help() {
   constexpr std::size_t column_width = 28;

@@ -47,11 +47,6 @@ struct GapOptions {
 // interrupt cancels the job.
 [[nodiscard]] Result<Exit> gap_from_server(const GapOptions& options);
 
-// What changes between groups of the recordings.
-[[nodiscard]] Result<Exit> gap_between_groups(const telemetry::RecordingSet& recordings,
-                                              const robot::RobotModel& robot, const GapOptions& options,
-                                              const report::ReportOrigin& origin);
-
 // Makes a comparison, prints it and writes its page.
 [[nodiscard]] Result<Exit> compare_and_print(
     const std::function<Result<gap::Comparison>(const gap::Progress&)>& compare,

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <span>
-
 #include "client/commands/outcome.h"
 
 namespace CLI {
@@ -9,10 +7,6 @@ class App;
 }
 
 namespace joulecast::client {
-
-// Adds one subcommand to the program; when that subcommand is chosen, parsing runs it and leaves its outcome
-// in `exit`, which must outlive the parse.
-using AddCommand = void (*)(CLI::App& program, Exit& exit);
 
 // Every subcommand of joulecast, in the order that --help lists them. A new one is a file and a word here.
 // The command study adds `thesis` and `gap trial`, which execute joulecast-study: it comes after gap.
@@ -27,7 +21,13 @@ using AddCommand = void (*)(CLI::App& program, Exit& exit);
 FOR_EACH_COMMAND(DECLARE_COMMAND)
 #undef DECLARE_COMMAND
 
-[[nodiscard]] std::span<const AddCommand> commands();
+// Adds the subcommands to the program; when one is chosen, parsing runs it and leaves its outcome in `exit`,
+// which must outlive the parse.
+inline void add_commands(CLI::App& program, Exit& exit) {
+#define ADD_COMMAND(name) add_##name(program, exit);
+  FOR_EACH_COMMAND(ADD_COMMAND)
+#undef ADD_COMMAND
+}
 
 // Subcommands of export.
 void add_export_rmf(CLI::App& group, Exit& exit);
