@@ -622,14 +622,13 @@ Application::~Application() = default;
 
 Result<std::unique_ptr<Application>> Application::start(const DaemonOptions& options) {
   auto parts = std::make_unique<Parts>(options);
-  Result<void> done = check_exposure(options);
-  if (done) done = parts->open_history();
-  if (done) done = parts->start_diagnosis();
-  if (done) done = parts->start_ingest();
-  if (done) done = parts->start_http();
-  if (done) done = parts->join_cluster();
-  if (done) done = parts->start_mqtt();
-  if (!done) return tl::unexpected(std::move(done.error()));
+  TRY(check_exposure(options));
+  TRY(parts->open_history());
+  TRY(parts->start_diagnosis());
+  TRY(parts->start_ingest());
+  TRY(parts->start_http());
+  TRY(parts->join_cluster());
+  TRY(parts->start_mqtt());
   parts->beat = std::thread([&p = *parts] { p.run_beat(); });
   parts->warming = std::thread([&p = *parts] { p.warm_forecasts(); });
   return std::unique_ptr<Application>(new Application(std::move(parts)));

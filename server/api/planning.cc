@@ -254,9 +254,8 @@ std::optional<Response> brief_profile(const Services& services, Request& r) {
 }
 
 Result<Response> profile(const Services& services, const Request& r) {
-  const ReadProfile read = read_profile(services, r);
-  if (!read) return tl::unexpected(read.error());
-  const auto& [model, input] = **read;
+  TRY_ASSIGN(const auto read, read_profile(services, r));
+  const auto& [model, input] = *read;
   TRY_ASSIGN(const auto output, answers::profile(input, *model, r.stop));
   return http::json_response(answers::profile_json(input, output, *model));
 }

@@ -52,12 +52,11 @@ class Exchange {
 
   // Call several times a second; one thread.
   Result<void> turn() {
-    Result<void> done = publish();
-    if (done) done = hear();
-    if (done) done = follow_models();
-    if (done) done = follow_requests();
-    if (done && turns_++ % turns_between_learning == 0) done = follow_learning();
-    return done;
+    TRY(publish());
+    TRY(hear());
+    TRY(follow_models());
+    TRY(follow_requests());
+    return turns_++ % turns_between_learning == 0 ? follow_learning() : Result<void>();
   }
 
  private:

@@ -173,17 +173,15 @@ Result<void> BrokerLink::start() {
   mosquitto_publish_callback_set(handle_, [](mosquitto*, void* self, int message) {
     static_cast<BrokerLink*>(self)->on_acknowledged(message);
   });
-  Result<void> set = done(mosquitto_threaded_set(handle_, true), "mqtt.url");
-  if (set && options_.tls) set = set_tls();
-  if (set && !options_.user.empty())
-    set = done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
-               "mqtt.user");
-  if (set)
-    set = done(
-        mosquitto_will_set(handle_, options_.last_topic.c_str(), static_cast<int>(options_.last_words.size()),
-                           options_.last_words.data(), 1, true),
-        "mqtt.interface");
-  if (!set) return set;
+  TRY(done(mosquitto_threaded_set(handle_, true), "mqtt.url"));
+  if (options_.tls) TRY(set_tls());
+  if (!options_.user.empty())
+    TRY(done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
+             "mqtt.user"));
+  TRY(done(
+      mosquitto_will_set(handle_, options_.last_topic.c_str(), static_cast<int>(options_.last_words.size()),
+                         options_.last_words.data(), 1, true),
+      "mqtt.interface"));
   const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
   if (code == MOSQ_ERR_INVAL) return done(code, "mqtt.url");
   thread_ = std::thread([this, code] { run(code); });

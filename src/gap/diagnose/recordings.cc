@@ -386,9 +386,8 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
-    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, progress, {}).run();
-    if (!earlier) return earlier;
-    d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
+    TRY_ASSIGN(const Diagnosis earlier, Diagnoser((*sides)[0], robot, progress, {}).run());
+    d->notes.push_back(earlier_words(earlier, (*sides)[1].missions.front().mission_id));
   }
   return d;
 }
