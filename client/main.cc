@@ -10,6 +10,6 @@ int main(int argc, char** argv) {
       "joulecast");
   prepare(program, "joulecast " JOULECAST_VERSION);
   Exit exit = Exit::ok;
-  for (const auto add : commands()) add(program, exit);
+  add_commands(program, exit);
   return run(program, argc, argv, exit);
 }

@@ -44,7 +44,6 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
-#include "server/settings_faults.h"
 
 namespace joulecast {
 namespace {
@@ -144,23 +143,20 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
                                                    std::vector<http::ReadinessCheck> checks,
                                                    const std::string& web_directory) {
   std::vector<http::Endpoint> table;
+  const auto add = [&table](std::vector<http::Endpoint> rows) {
+    table.insert(table.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
+  };
   for (http::Endpoint& row : api::endpoints(services))
     table.push_back(gate.audited(keys.honoured(std::move(row))));
-  for (http::Endpoint& row : gate.session_endpoints()) table.push_back(std::move(row));
-  table.push_back(http::events_endpoint(events));
-  for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
-    table.push_back(std::move(row));
-  Result<std::vector<http::Endpoint>> documented =
-      http::with_openapi(std::move(table), api::schemas(), embedded_examples());
-  if (!documented) return documented;
-  Result<std::vector<http::Endpoint>> page =
-      web_directory.empty() ? Result<std::vector<http::Endpoint>>(http::asset_endpoints(embedded_web()))
-                            : http::asset_endpoints_from(web_directory);
-  if (!page) return page;
-  for (http::Endpoint& row : *page) documented->push_back(std::move(row));
-  for (http::Endpoint& row : http::asset_endpoints(embedded_reference()))
-    documented->push_back(std::move(row));
-  return documented;
+  add(gate.session_endpoints());
+  add({http::events_endpoint(events)});
+  add(http::operations_endpoints(metrics, std::move(checks)));
+  TRY_ASSIGN(table, http::with_openapi(std::move(table), api::schemas(), embedded_examples()));
+  TRY_ASSIGN(auto page, web_directory.empty() ? http::asset_endpoints(embedded_web())
+                                              : http::asset_endpoints_from(web_directory));
+  add(std::move(page));
+  add(http::asset_endpoints(embedded_reference()));
+  return table;
 }
 
 }  // namespace
@@ -179,10 +175,8 @@ struct Application::Parts {
 
   Result<void> open_history() {
     const bool by_path = options.store_url.empty();
-    if (Result<server::ClusterOptions> wanted = cluster_options(options); !wanted)
-      return tl::unexpected(std::move(wanted.error()));
-    else if (!wanted->name.empty())
-      in_cluster = std::move(*wanted);
+    TRY_ASSIGN(server::ClusterOptions wanted, cluster_options(options));
+    if (!wanted.name.empty()) in_cluster = std::move(wanted);
     TRY_ASSIGN(const auto options_of_store, store_options(options));
     Result<std::unique_ptr<history::Store>> opened =
         in_cluster ? history::open_shared_store(
@@ -197,8 +191,8 @@ struct Application::Parts {
                   std::move(opened.error().message));
     store = std::move(*opened);
     warn_of_network_file_system();
-    if (Result<void> taken = take_in_spool(spool_path(options), *store); !taken) return taken;
-    if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
+    TRY(take_in_spool(spool_path(options), *store));
+    TRY(open_webhooks());
     history::WriterOptions writing = options.writer;
     writing.spool_path = spool_path(options);
     if (in_cluster) writing.prunes = [this] { return joined && cluster->is_first(); };
@@ -411,18 +405,15 @@ struct Application::Parts {
         *services, is_own(), [](const Error& error) { log_error("attention", error); });
     services->attention = attention.get();
     attention->start();
-    Result<std::unique_ptr<http::Gate>> opened =
-        http::Gate::open({.token_file = options.token_file,
-                          .now_utime_us = host_utime_us,
-                          .audit = audit_into(*writer),
-                          .not_audited = [](const http::AccessEvent& event, const Error& error) {
-                            log_error("not audited", {{"operation", event.action},
-                                                      {"request_id", event.request_id},
-                                                      {"actor", event.actor},
-                                                      {"cause", describe(error)}});
-                          }});
-    if (!opened) return tl::unexpected(std::move(opened.error()));
-    gate = std::move(*opened);
+    TRY_ASSIGN(gate, http::Gate::open({.token_file = options.token_file,
+                                       .now_utime_us = host_utime_us,
+                                       .audit = audit_into(*writer),
+                                       .not_audited = [](const http::AccessEvent& event, const Error& error) {
+                                         log_error("not audited", {{"operation", event.action},
+                                                                   {"request_id", event.request_id},
+                                                                   {"actor", event.actor},
+                                                                   {"cause", describe(error)}});
+                                       }}));
     idempotency =
         std::make_unique<api::IdempotencyKeys>(answers_in(*store, *writer, options.http.request_deadline));
     TRY_ASSIGN(auto table, endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
@@ -500,17 +491,14 @@ struct Application::Parts {
 
   // A faulty file costs its robot, not the fleet.
   Result<void> load_robot_files(const std::string& directory) {
-    const Result<ingest::RobotFiles> files = ingest::read_robot_files(directory);
-    if (!files) return tl::unexpected(files.error());
-    for (const Error& faulty : files->faulty) log_error("robot file left out", faulty);
-    for (const auto& [path, robot] : files->robots) {
-      if (Result<void> loaded = ingest::load_robot(robot, path, *store, *writer, host_utime_us()); !loaded)
-        return loaded;
-    }
-    faulty_files.set(static_cast<double>(files->faulty.size()));
+    TRY_ASSIGN(const ingest::RobotFiles files, ingest::read_robot_files(directory));
+    for (const Error& faulty : files.faulty) log_error("robot file left out", faulty);
+    for (const auto& [path, robot] : files.robots)
+      TRY(ingest::load_robot(robot, path, *store, *writer, host_utime_us()));
+    faulty_files.set(static_cast<double>(files.faulty.size()));
     log_info("robot files read", {{"directory", directory},
-                                  {"files", std::to_string(files->robots.size())},
-                                  {"faulty", std::to_string(files->faulty.size())}});
+                                  {"files", std::to_string(files.robots.size())},
+                                  {"faulty", std::to_string(files.faulty.size())}});
     return {};
   }
 
@@ -634,14 +622,13 @@ Application::~Application() = default;
 
 Result<std::unique_ptr<Application>> Application::start(const DaemonOptions& options) {
   auto parts = std::make_unique<Parts>(options);
-  Result<void> done = check_exposure(options);
-  if (done) done = parts->open_history();
-  if (done) done = parts->start_diagnosis();
-  if (done) done = parts->start_ingest();
-  if (done) done = parts->start_http();
-  if (done) done = parts->join_cluster();
-  if (done) done = parts->start_mqtt();
-  if (!done) return tl::unexpected(std::move(done.error()));
+  TRY(check_exposure(options));
+  TRY(parts->open_history());
+  TRY(parts->start_diagnosis());
+  TRY(parts->start_ingest());
+  TRY(parts->start_http());
+  TRY(parts->join_cluster());
+  TRY(parts->start_mqtt());
   parts->beat = std::thread([&p = *parts] { p.run_beat(); });
   parts->warming = std::thread([&p = *parts] { p.warm_forecasts(); });
   return std::unique_ptr<Application>(new Application(std::move(parts)));

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "history/open_store.h"
@@ -71,5 +72,14 @@ Result<server::ClusterOptions> cluster_options(const DaemonOptions& options);
 // Fault::invalid on "mqtt.url", "mqtt.client_id", "mqtt.interface", "mqtt.manufacturer" or
 // "mqtt.password_file".
 Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options);
+
+// All errors in the values of the settings that can be detected without opening the store or connecting to a
+// broker: access to the service, the URL of the history, the cluster, accepted senders of telemetry,
+// webhooks, MQTT, robot files.
+std::vector<Error> faults_of(const DaemonOptions& options);
+
+// Without tokens only loopback addresses are permitted, unless http.insecure is set. Fault::invalid on
+// "http.address" or "http.allowed_origins"; unsafe settings that are permitted are logged.
+Result<void> check_exposure(const DaemonOptions& options);
 
 }  // namespace joulecast

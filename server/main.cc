@@ -6,9 +6,9 @@
 
 #include "history/store_care.h"
 #include "server/application.h"
+#include "server/daemon_options.h"
 #include "server/logging.h"
 #include "server/settings.h"
-#include "server/settings_faults.h"
 
 namespace {
 

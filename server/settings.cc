@@ -9,7 +9,6 @@
 #include "base/bounds.h"
 #include "base/json_text.h"
 #include "base/nearest_word.h"
-#include "base/overloaded.h"
 #include "base/text_file.h"
 #include "base/try.h"
 #include "server/http/text.h"
@@ -34,22 +33,7 @@ std::vector<std::string> all_names(Name name) {
   return names;
 }
 
-enum class Type : std::uint8_t { text, integer, number, boolean, choice };
-
-Type type_of(const Target& member) {
-  return std::visit(
-      Overloaded{[](bool*) { return Type::boolean; }, [](const Choice&) { return Type::choice; },
-                 [](const Limit& limit) { return limit.unit == 1 ? Type::integer : Type::number; },
-                 [](const Duration&) { return Type::number; },
-                 [](auto* value) {
-                   using T = std::remove_pointer_t<decltype(value)>;
-                   if (std::is_integral_v<T>) return Type::integer;
-                   return std::is_same_v<T, double> || std::is_same_v<T, std::chrono::milliseconds>
-                              ? Type::number
-                              : Type::text;
-                 }},
-      member);
-}
+using Type = Target::Type;
 
 std::string joined(const auto& texts) {
   std::string all;
@@ -57,43 +41,11 @@ std::string joined(const auto& texts) {
   return all;
 }
 
-// The value of a member as it is set.
-std::string text_of(const Target& member) {
-  return std::visit(
-      Overloaded{[](const std::string* value) { return *value; },
-                 [](const std::vector<std::string>* value) { return joined(*value); },
-                 [](const std::set<std::string>* value) { return joined(*value); },
-                 [](const bool* value) { return std::string(*value ? "true" : "false"); },
-                 [](const std::chrono::milliseconds* value) {
-                   return number_text(static_cast<double>(value->count()) / 1e3);
-                 },
-                 [](const double* value) { return number_text(*value); },
-                 [](const Duration& value) { return number_text(static_cast<double>(*value.us) / 1e6); },
-                 [](const Limit& limit) {
-                   const auto value = static_cast<double>(limit.value->value_or(0)) / limit.unit;
-                   return limit.unit == 1 ? std::to_string(limit.value->value_or(0)) : number_text(value);
-                 },
-                 [](const Choice& choice) { return std::string(choice.names[choice.chosen]); },
-                 [](const auto* value) { return std::to_string(*value); }},
-      member);
-}
-
 std::string kind(const Target& member) {
-  switch (type_of(member)) {
-    case Type::text:
-      return "text";
-    case Type::integer:
-      return "integer";
-    case Type::number:
-      return "number";
-    case Type::boolean:
-      return "true|false";
-    case Type::choice:
-      break;
-  }
+  static constexpr const char* kinds[] = {"text", "integer", "number", "true|false"};
+  if (member.type != Type::choice) return kinds[static_cast<std::size_t>(member.type)];
   std::string choices;
-  for (const std::string_view name : std::get<Choice>(member).names)
-    choices.append(choices.empty() ? "" : "|").append(name);
+  for (const std::string_view name : member.names) choices.append(choices.empty() ? "" : "|").append(name);
   return choices;
 }
 
@@ -103,63 +55,27 @@ Target default_member(const Setting& setting) {
   return setting.member(defaults);
 }
 
-void put_number(double number, const Target& member) {
-  std::visit(Overloaded{[&](std::chrono::milliseconds* value) {
-                          *value = std::chrono::milliseconds(static_cast<std::int64_t>(number * 1e3));
-                        },
-                        [&](const Duration& value) { *value.us = static_cast<std::int64_t>(number * 1e6); },
-                        [&](const Limit& limit) {
-                          limit.value->reset();
-                          if (number > 0) *limit.value = static_cast<std::int64_t>(number * limit.unit);
-                        },
-                        [&](auto* value) {
-                          using T = std::remove_pointer_t<decltype(value)>;
-                          if constexpr (std::is_arithmetic_v<T>) *value = static_cast<T>(number);
-                        },
-                        [](const Choice&) {}},
-             member);
-}
-
 // Sets a member, or returns the constraint that `value` breaks.
 std::optional<std::string> put(const Setting& setting, std::string_view value, const Target& member) {
   const std::string shown = ", is \"" + std::string(value) + "\"";
-  switch (type_of(member)) {
-    case Type::text:
-      if (value.find_first_of(std::string_view("\0\n\r", 3)) != std::string_view::npos)
-        return "must not contain line breaks";
-      if (auto* const* text = std::get_if<std::string*>(&member)) **text = value;
-      if (auto* const* list = std::get_if<std::vector<std::string>*>(&member)) **list = http::listed(value);
-      if (auto* const* all = std::get_if<std::set<std::string>*>(&member)) {
-        const std::vector<std::string> list = http::listed(value);
-        **all = {list.begin(), list.end()};
-      }
-      return std::nullopt;
-    case Type::boolean:
-      if (value != "true" && value != "false") return "must be true or false" + shown;
-      *std::get<bool*>(member) = value == "true";
-      return std::nullopt;
-    case Type::choice: {
-      const Choice& choice = std::get<Choice>(member);
-      const auto found = std::ranges::find(choice.names, value);
-      if (found == choice.names.end()) return "must be one of " + kind(member) + shown;
-      choice.choose(static_cast<std::size_t>(found - choice.names.begin()));
-      return std::nullopt;
-    }
-    case Type::integer:
-    case Type::number:
-      break;
+  if (member.type == Type::integer || member.type == Type::number) {
+    const bool whole = member.type == Type::integer;
+    const auto number =
+        whole ? std::optional<double>(parse_number<std::int64_t>(value)) : parse_number<double>(value);
+    if (!number) return (whole ? "must be an integer" : "must be a finite number") + shown;
+    if (const Bounds bounds{setting.minimum, setting.maximum}; !bounds.contain(*number))
+      return out_of_bounds(*number, bounds, setting.unit);
+    member.set_number(*number);
+    return std::nullopt;
   }
-  std::optional<double> number;
-  if (type_of(member) == Type::integer) {
-    if (const auto whole = parse_number<std::int64_t>(value)) number = static_cast<double>(*whole);
-    if (!number) return "must be an integer" + shown;
-  } else {
-    number = parse_number<double>(value);
-    if (!number) return "must be a finite number" + shown;
-  }
-  if (const Bounds bounds{setting.minimum, setting.maximum}; !bounds.contain(*number))
-    return out_of_bounds(*number, bounds, setting.unit);
-  put_number(*number, member);
+  if (member.type == Type::text &&
+      value.find_first_of(std::string_view("\0\n\r", 3)) != std::string_view::npos)
+    return "must not contain line breaks";
+  if (member.type == Type::boolean && value != "true" && value != "false")
+    return "must be true or false" + shown;
+  if (member.type == Type::choice && std::ranges::find(member.names, value) == member.names.end())
+    return "must be one of " + kind(member) + shown;
+  member.set(value);
   return std::nullopt;
 }
 
@@ -196,6 +112,54 @@ struct Pending {
 
 }  // namespace
 
+Target target(std::string& member) {
+  return {Type::text, member, [&member](std::string_view value) { member = value; }};
+}
+
+Target target(std::vector<std::string>& member) {
+  return {Type::text, joined(member), [&member](std::string_view value) { member = http::listed(value); }};
+}
+
+Target target(std::set<std::string>& member) {
+  return {Type::text, joined(member), [&member](std::string_view value) {
+            const std::vector<std::string> list = http::listed(value);
+            member = {list.begin(), list.end()};
+          }};
+}
+
+Target target(bool& member) {
+  return {Type::boolean, member ? "true" : "false",
+          [&member](std::string_view value) { member = value == "true"; }};
+}
+
+Target target(double& member) {
+  return {Type::number, number_text(member), {}, [&member](double value) { member = value; }};
+}
+
+Target target(std::chrono::milliseconds& member) {
+  return {Type::number, number_text(static_cast<double>(member.count()) / 1e3), {}, [&member](double value) {
+            member = std::chrono::milliseconds(static_cast<std::int64_t>(value * 1e3));
+          }};
+}
+
+Target duration(std::int64_t& us) {
+  return {Type::number, number_text(static_cast<double>(us) / 1e6), {}, [&us](double value) {
+            us = static_cast<std::int64_t>(value * 1e6);
+          }};
+}
+
+Target limit(std::optional<std::int64_t>& member, double unit) {
+  const std::int64_t value = member.value_or(0);
+  const bool whole = unit == 1;
+  return {whole ? Type::integer : Type::number,
+          whole ? std::to_string(value) : number_text(static_cast<double>(value) / unit),
+          {},
+          [&member, unit](double given) {
+            member.reset();
+            if (given > 0) member = static_cast<std::int64_t>(given * unit);
+          }};
+}
+
 std::string Setting::flag() const {
   std::string name = "--" + std::string(key);
   std::replace_if(
@@ -212,7 +176,7 @@ std::string Setting::environment() const {
 }
 
 std::string Setting::default_value() const {
-  return text_of(default_member(*this));
+  return default_member(*this).text;
 }
 
 std::string_view to_string(Origin origin) {
@@ -264,7 +228,7 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
         continue;
       }
       const Target member = default_member(*setting);
-      if (const auto text = text_in_file(type_of(member), value))
+      if (const auto text = text_in_file(member.type, value))
         problems.add(set(key, *text, Origin::file, prefix + key));
       else
         problems.add(invalid(prefix + key, "must be of type " + kind(member)));
@@ -279,11 +243,10 @@ std::string Settings::print() const {
   for (const Setting& setting : settings_table()) {
     const Target member = setting.member(options);
     std::string line = std::string(setting.key) + " = ";
-    const bool quoted = type_of(member) == Type::text || type_of(member) == Type::choice;
-    line +=
-        quoted
-            ? nlohmann::json(text_of(member)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
-            : text_of(member);
+    const bool quoted = member.type == Type::text || member.type == Type::choice;
+    line += quoted
+                ? nlohmann::json(member.text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
+                : member.text;
     line.resize(std::max<std::size_t>(line.size() + 2, 60), ' ');
     text += line + "# " + std::string(to_string(origin(setting.key))) +
             (setting.unit.empty() ? "" : std::string(", ").append(setting.unit)) + "\n";
@@ -479,9 +442,9 @@ std::string settings_schema() {
                  : ordered_json(bound);
     };
     const Target member = default_member(setting);
-    const Type type = type_of(member);
+    const Type type = member.type;
     if (type == Type::choice)
-      entry["enum"] = std::get<Choice>(member).names;
+      entry["enum"] = member.names;
     else
       entry["type"] = type == Type::text ? "string" : type == Type::boolean ? "boolean" : kind(member);
     const std::string value = setting.default_value();

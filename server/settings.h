@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <concepts>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -9,7 +11,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
 #include "base/error.h"
@@ -21,31 +22,44 @@
 // file > default. Unknown keys are errors wherever they come from.
 namespace joulecast {
 
-// A member in microseconds, set in seconds.
-struct Duration {
-  std::int64_t* us;
+// The member of a setting, by the type of its values.
+struct Target {
+  enum class Type : std::uint8_t { text, integer, number, boolean, choice };
+  Type type;
+  std::string text;                              // the present value, as it is set
+  std::function<void(std::string_view)> set;     // a text, "true" or "false", or one of the names of a choice
+  std::function<void(double)> set_number = {};   // an integer or a number
+  std::span<const std::string_view> names = {};  // of a choice
 };
-// A member that is absent at 0, set in multiples of `unit`.
-struct Limit {
-  std::optional<std::int64_t>* value;
-  double unit;
-};
-// An enumeration whose values, from `first` on, are in the order of the names.
-struct Choice {
-  std::span<const std::string_view> names;
-  std::size_t chosen;
-  std::function<void(std::size_t)> choose;
-
-  template <class E>
-  static Choice of(E& member, std::span<const std::string_view> names, int first = 0) {
-    return {names, static_cast<std::size_t>(static_cast<int>(member) - first),
-            [&member, first](std::size_t k) { member = static_cast<E>(static_cast<int>(k) + first); }};
-  }
-};
-// The member of a setting: a text, a list of texts, an integer, a number, true or false, or a choice.
-using Target = std::variant<std::string*, std::vector<std::string>*, std::set<std::string>*, std::uint16_t*,
-                            std::uint32_t*, std::uint64_t*, double*, std::chrono::milliseconds*, Duration,
-                            Limit, bool*, Choice>;
+// Of a text, a list of texts, an integer, a number, milliseconds that are set in seconds, or true or false.
+Target target(std::string& member);
+Target target(std::vector<std::string>& member);
+Target target(std::set<std::string>& member);
+Target target(bool& member);
+Target target(double& member);
+Target target(std::chrono::milliseconds& member);
+template <std::integral T>
+Target target(T& member) {
+  return {Target::Type::integer, std::to_string(member), {}, [&member](double value) {
+            member = static_cast<T>(value);
+          }};
+}
+// Of microseconds that are set in seconds.
+Target duration(std::int64_t& us);
+// Of a value that is absent at 0, set in multiples of `unit`.
+Target limit(std::optional<std::int64_t>& member, double unit);
+// Of an enumeration whose values, from `first` on, are in the order of the names.
+template <class E>
+Target choice(E& member, std::span<const std::string_view> names, int first = 0) {
+  const auto index = static_cast<std::size_t>(static_cast<int>(member) - first);
+  return {Target::Type::choice,
+          std::string(names[index]),
+          [&member, names, first](std::string_view name) {
+            member = static_cast<E>(std::ranges::find(names, name) - names.begin() + first);
+          },
+          {},
+          names};
+}
 
 struct Setting {
   std::string_view key;

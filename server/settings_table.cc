@@ -11,9 +11,9 @@ constexpr std::string_view mqtt_dialects[] = {"vda5050-3.0", "vda5050-2.1"};
 constexpr double megabyte = 1024.0 * 1024.0;
 constexpr double us_per_day = 86400e6;
 
-#define MEMBER(member) [](DaemonOptions& o) -> Target { return &o.member; }
-#define DURATION(member) [](DaemonOptions& o) -> Target { return Duration{&o.member}; }
-#define LIMIT(member, unit) [](DaemonOptions& o) -> Target { return Limit{&o.member, unit}; }
+#define MEMBER(member) [](DaemonOptions& o) { return target(o.member); }
+#define DURATION(member) [](DaemonOptions& o) { return duration(o.member); }
+#define LIMIT(member, unit) [](DaemonOptions& o) { return limit(o.member, unit); }
 
 // key, member, minimum, maximum, unit, help
 constexpr Setting table[] = {
@@ -111,8 +111,8 @@ constexpr Setting table[] = {
      "first level of the topics, the interface name of VDA 5050; not the one that the robots use"},
     {"mqtt.manufacturer", MEMBER(mqtt.manufacturer), 0, 0, "",
      "manufacturer of the robots, a level of the topics"},
-    {"mqtt.dialect", [](DaemonOptions& o) -> Target { return Choice::of(o.mqtt.dialect, mqtt_dialects, 1); },
-     0, 0, "", "format of the messages"},
+    {"mqtt.dialect", [](DaemonOptions& o) { return choice(o.mqtt.dialect, mqtt_dialects, 1); }, 0, 0, "",
+     "format of the messages"},
     {"mqtt.period_s", MEMBER(mqtt.period), 0.5, 3600, "s",
      "time between two publications of a robot's battery"},
 
@@ -126,8 +126,8 @@ constexpr Setting table[] = {
      "replication delay; empty: none"},
     {"store.read_staleness_s", MEMBER(store.standby.max_staleness_s), 0.5, 3600, "s",
      "replication delay of the standby beyond which the server of store.url is queried instead"},
-    {"store.synchronous",
-     [](DaemonOptions& o) -> Target { return Choice::of(o.store.durability, store_synchronous); }, 0, 0, "",
+    {"store.synchronous", [](DaemonOptions& o) { return choice(o.store.durability, store_synchronous); }, 0,
+     0, "",
      "durability of a commit to the SQLite file: full survives a loss of power; normal, for slow disks, "
      "survives a crash of the daemon only"},
     {"store.retention_days", LIMIT(writer.retention.telemetry_max_age_us, us_per_day), 0, 36500, "d",
@@ -233,9 +233,9 @@ constexpr Setting table[] = {
     {"metrics.robots", MEMBER(robots_with_metrics), 0, 10000, "",
      "robots with their own metrics at /metrics, the first by id, about 25 series each; 0: none"},
 
-    {"log.format", [](DaemonOptions& o) -> Target { return Choice::of(o.log_format, log_formats); }, 0, 0, "",
+    {"log.format", [](DaemonOptions& o) { return choice(o.log_format, log_formats); }, 0, 0, "",
      "format of log lines: text for a terminal, or json, one object per line"},
-    {"log.level", [](DaemonOptions& o) -> Target { return Choice::of(o.log_level, log_levels); }, 0, 0, "",
+    {"log.level", [](DaemonOptions& o) { return choice(o.log_level, log_levels); }, 0, 0, "",
      "lowest level that is written"},
 };
 

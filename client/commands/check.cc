@@ -20,7 +20,6 @@
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
-#include "client/lcm_url.h"
 #include "client/log_progress.h"
 #include "dynamics/drive_model.h"
 #include "robot/review.h"

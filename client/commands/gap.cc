@@ -10,10 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/back_test_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
-#include "client/commands/gap_parts.h"
 #include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -81,14 +80,12 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
 
 const described::Table<GapTest>& test_table() {
   using R = energy::RegressionComparison;
-  using M = energy::MissedPower;
-  using described::within;
   static const auto beside =
       described::Table<R>()
           .value("windows", &R::windows, "windows with new readings")
-          .number_or_null("file_missed", within(&R::missed, &M::file), "mean |error| over mean |power| there")
-          .number_or_null("corrected_missed", within(&R::missed, &M::corrected), "with the effects found")
-          .number_or_null("regression_missed", within(&R::missed, &M::regression), "of a linear regression")
+          .number_or_null("file_missed", AT(missed.file), "mean |error| over mean |power| there")
+          .number_or_null("corrected_missed", AT(missed.corrected), "with the effects found")
+          .number_or_null("regression_missed", AT(missed.regression), "of a linear regression")
           .value("regression_wins", &R::regression_wins, "the regression predicts better");
   static const auto table =
       described::Table<GapTest>()
@@ -122,11 +119,9 @@ struct Judged {
 
 Result<Judged> judge_recordings(const GapOptions& options, const telemetry::RecordingSet& recordings,
                                 const robot::RobotModel& robot) {
-  const auto diagnosed = [&] {
-    Progress progress("diagnosing", "%", 100);
-    return gap::diagnose(recordings, robot, progress.shares());
-  };
-  TRY_ASSIGN(auto diagnosis, diagnosed());
+  TRY_ASSIGN(auto diagnosis, with_progress("diagnosing", [&](const gap::Progress& progress) {
+               return gap::diagnose(recordings, robot, progress);
+             }));
   Judged judged{std::move(diagnosis), std::nullopt};
   if (options.test.empty()) return judged;
   const gap::Offer offer = gap::offer_of(judged.diagnosis);
@@ -147,6 +142,16 @@ Result<void> apply(const GapOptions& options, const Judged& judged, const robot:
   return apply_offer(options, offer, robot);
 }
 
+Result<Exit> gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                                const GapOptions& options, const report::ReportOrigin& origin) {
+  TRY_ASSIGN(const auto groups, gap::groups_of(recordings, options.compare_by));
+  return compare_and_print(
+      [&](const gap::Progress& progress) {
+        return gap::compare_recordings(recordings, groups, robot, progress);
+      },
+      robot, options, origin);
+}
+
 Result<Exit> gap_of_logs(const GapOptions& options, const robot::RobotModel& robot) {
   const auto read = [&] {
     LogProgress progress("reading", options.logs);
@@ -159,17 +164,10 @@ Result<Exit> gap_of_logs(const GapOptions& options, const robot::RobotModel& rob
   TRY_ASSIGN(const auto judged, judge_recordings(options, recordings, robot));
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged.diagnosis);
   const auto test = judged.test ? test_table().document(*judged.test) : nlohmann::ordered_json();
-  if (options.json) {
-    if (judged.test) document["back_test"] = test;
-    std::printf("%s\n", document.dump(2).c_str());
-  } else {
-    print_diagnosis(document);
-    if (judged.test) print(*judged.test, test, options.unit);
-  }
-  if (!options.report.empty()) {
-    const auto page = report::report_html(document, robot, origin);
-    TRY(write_page(options, page));
-  }
+  if (options.json && judged.test) document["back_test"] = test;
+  show_diagnosis(options, document);
+  if (!options.json && judged.test) print(*judged.test, test, options.unit);
+  TRY(write_page(options, document, robot, origin));
   if (!options.apply.empty()) TRY(apply(options, judged, robot));
   return Exit::ok;
 }

@@ -11,7 +11,6 @@
 #include "base/host_clock.h"
 #include "base/json_number.h"
 #include "base/utc_time.h"
-#include "client/commands/gap_parts.h"
 #include "client/commands/print.h"
 #include "client/files.h"
 #include "client/wrapped.h"
@@ -215,6 +214,75 @@ void print_effect(const Json& e) {
     fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
 }
 
+// " scrub stribeck", or " nothing".
+std::string names_in(const Json& ids) {
+  std::string names;
+  for (const Json& id : ids) names += " " + text(id);
+  return names.empty() ? " nothing" : names;
+}
+
+void print_limits(const Json& d) {
+  fmt::print("limits:\n");
+  for (const Json& limit : d["limits"]) print_item(text(limit));
+}
+
+// What a diagnosis of runs has in addition.
+void print_runs(const Json& d) {
+  fmt::print("model by {}; scatter of the runs {:.1f} % in addition to any cause\n",
+             member_at(d, "model/given") == true ? "the table" : "the robot file",
+             percent_at(d, "scatter/run"));
+  if (!d["left_out_conditions"].empty())
+    fmt::print("mean error of the runs of one condition, with all of them held out:\n");
+  for (const Json& l : d["left_out_conditions"])
+    fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (regression {:.1f} %), named:{}\n",
+               text(l["left_out"]), l["runs"].get<std::size_t>(), percent_at(l, "held_out_before"),
+               percent_at(l, "held_out_after"), percent_at(l, "baseline_held_out"), names_in(l["effects"]));
+  print_limits(d);
+  if (!d["not_visible"].empty())
+    fmt::print("  - Not detectable in these runs:{}\n", names_in(d["not_visible"]));
+}
+
+std::string per_way(const Json& joules_per_m, const std::string& unit) {
+  return energy_per_way_text(number_or_nan(joules_per_m), unit);
+}
+
+std::string signed_per_way(const Json& joules_per_m, const std::string& unit) {
+  return (number_or_nan(joules_per_m) < 0 ? "" : "+") + per_way(joules_per_m, unit);
+}
+
+// What a comparison of groups has in addition.
+void print_comparison(const Json& d, const std::string& unit) {
+  fmt::print("groups:\n");
+  for (const Json& g : d["groups"]) {
+    fmt::print("  {:<14} {}, {:.4g} m", text(g["name"]),
+               count_of(g["missions"].get<std::size_t>(), "mission"), number_or_nan(g["way_m"]));
+    if (g["energy_per_m_j"].is_number())
+      fmt::print(": {}, by the model with the common effects {}", per_way(g["energy_per_m_j"], unit),
+                 per_way(g["model_per_m_j"], unit));
+    fmt::print("\n");
+  }
+  for (const Json& e : d["strengths"]) {
+    fmt::print("{} {} above the group where it is weakest:\n", text(e["id"]), text(e["parameter"]));
+    for (const Json& g : d["groups"]) {
+      const Json& s = e["groups"][text(g["name"])];
+      fmt::print("  {:<14} {:.4g}{}{}", text(g["name"]), number_or_nan(s["value"]), plus_minus(s["sd"]),
+                 e["unit"] == "1" ? "" : " " + text(e["unit"]));
+      if (s["energy_per_m_j"].is_number()) fmt::print(" ({})", signed_per_way(s["energy_per_m_j"], unit));
+      fmt::print("\n");
+    }
+  }
+  if (const Json& by = d["difference"]; !by.is_null()) {
+    fmt::print("{} takes {} more than {}: {} by motion and load", text(by["to"]),
+               per_way(by["energy_per_m_j"], unit), text(by["from"]),
+               signed_per_way(by["by_motion_j"], unit));
+    for (const Json& e : d["strengths"])
+      fmt::print(", {} by {}", signed_per_way(by["by_effect_j"][text(e["id"])], unit), text(e["id"]));
+    fmt::print(", {} unexplained\n", signed_per_way(by["unexplained_j"], unit));
+  }
+  fmt::print("effects common to all groups:{}\n", names_in(d["common"]));
+  print_limits(d);
+}
+
 Json number_or_null(double value) {
   return std::isfinite(value) ? Json(value) : Json();
 }
@@ -259,7 +327,7 @@ Json tally_json(const std::string& channel, const telemetry::ChannelTally& tally
 
 }  // namespace
 
-void print_diagnosis(const Json& d) {
+void print_diagnosis(const Json& d, const std::string& unit) {
   fmt::print("{}: {}, {}{}\n", text(d["robot_id"]), count_of(d["missions"].get<std::size_t>(), "mission"),
              count_of(d["samples"].get<std::size_t>(), "sample"),
              d["motor_channels"] == true || d["power"] != gap::name_of(gap::PowerSource::battery)
@@ -282,6 +350,9 @@ void print_diagnosis(const Json& d) {
   print_where(d["where"]);
   print_next_drives(d["next_drive"]);
   print_adoption(d);
+  const std::string kind = text(member_at(d, "kind"));
+  if (kind == "mission_energies") print_runs(d);
+  if (kind == "comparison") print_comparison(d, unit);
 }
 
 Error of_option(Error error, const std::string& option) {
@@ -293,8 +364,18 @@ Error of_option(Error error, const std::string& option) {
   return error;
 }
 
-Result<void> write_page(const GapOptions& options, const std::string& page) {
-  return write_text_file(options.report, page, existing(options.force));
+void show_diagnosis(const GapOptions& options, const nlohmann::ordered_json& document) {
+  if (options.json)
+    fmt::print("{}\n", document.dump(2));
+  else
+    print_diagnosis(document, options.unit);
+}
+
+Result<void> write_page(const GapOptions& options, const nlohmann::ordered_json& document,
+                        const robot::RobotModel& robot, const report::ReportOrigin& origin) {
+  if (options.report.empty()) return {};
+  return write_text_file(options.report, report::report_html(document, robot, origin),
+                         existing(options.force));
 }
 
 Result<void> apply_offer(const GapOptions& options, const gap::Offer& offer, const robot::RobotModel& robot) {

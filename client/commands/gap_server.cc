@@ -8,7 +8,6 @@
 #include "base/json_number.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
-#include "client/commands/gap_parts.h"
 #include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/files.h"
@@ -37,9 +36,7 @@ Result<Json> follow(const std::string& server, Json job) {
                     "interrupted; the diagnosis continues: " + describe(cancelled.error()));
       return fail(Fault::conflict, "", "interrupted; the diagnosis is cancelled");
     }
-    auto now = ask_object(server, target);
-    if (!now) return now;
-    job = std::move(*now);
+    TRY_ASSIGN(job, ask_object(server, target));
   }
   if (job["state"] != "done") {
     const std::string why = job["error"].is_string() ? job["error"].get<std::string>() : "";
@@ -90,7 +87,7 @@ Result<Exit> carry_out(const GapOptions& options) {
   TRY_ASSIGN(const auto job, follow(options.server, std::move(first)));
   if (!options.report.empty()) {
     TRY_ASSIGN(const auto page, ask(options.server, HttpMethod::get, diagnosis_target(job, "/report")));
-    TRY(write_page(options, page.body));
+    TRY(write_text_file(options.report, page.body, existing(options.force)));
   }
   if (!options.json) print_result(job);
   Json out = job["result"];

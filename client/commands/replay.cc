@@ -17,7 +17,6 @@
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
-#include "client/lcm_url.h"
 #include "client/log_progress.h"
 #include "history/open_store.h"
 #include "history/writer.h"
@@ -97,9 +96,7 @@ Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer
     if (due > Clock::now() + std::chrono::microseconds(200) || tally.events % 64 == 0) {
       if (interrupt.wait_until(due)) return false;
     }
-    if (auto sent = link.publish(std::string(event.channel), event.data); !sent) {
-      return tl::unexpected(std::move(sent.error()));
-    }
+    TRY(link.publish(std::string(event.channel), event.data));
     progress.passed(event);
     return true;
   };

@@ -22,13 +22,13 @@
 #include "base/text_file.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "client/commands/listen.h"
 #include "client/commands/option.h"
 #include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/interrupt.h"
-#include "client/lcm_url.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
 #include "signals/ids.h"
@@ -119,20 +119,18 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
       source = options.robot_files[k % options.robot_files.size()];
       TRY_ASSIGN(text, read_text_file(source));
     }
-    auto member = make_member(source, text, std::nullopt);
-    if (!member) return tl::unexpected(member.error());
+    TRY_ASSIGN(auto member, make_member(source, text, std::nullopt));
     if (options.robot_files.empty() || *options.robots != options.robot_files.size()) {
-      member = make_member(source, text, numbered(member->spec.robot.robot_id, k));
-      if (!member) return tl::unexpected(member.error());
+      TRY_ASSIGN(member, make_member(source, text, numbered(member.spec.robot.robot_id, k)));
     }
-    const std::string& id = member->spec.robot.robot_id;
+    const std::string& id = member.spec.robot.robot_id;
     if (!signals::is_valid_robot_id(id))
       return invalid(source + "#/robot_id", "\"" + id + "\" is no robot id");
     if (std::any_of(members.begin(), members.end(),
                     [&](const FleetMember& m) { return m.spec.robot.robot_id == id; })) {
       return invalid("robot", "two robots are called " + id);
     }
-    vr::SimulationSpec& spec = member->spec;
+    vr::SimulationSpec& spec = member.spec;
     spec.imperfections = imperfections;
     spec.world = floor;
     spec.rate_hz = options.rate_hz;
@@ -145,7 +143,7 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
     spec.sensors.gyro = !options.no_gyro;
     spec.sensors.pose = !options.no_pose;
     spec.initial_charge = options.initial_charge;
-    members.push_back(std::move(*member));
+    members.push_back(std::move(member));
   }
   return members;
 }
@@ -183,9 +181,7 @@ struct Outlets {
     const std::string channel = telemetry::channel_of(subjects[emission.message.index()], robot_id);
     if (link) {
       const auto key = keys.find(robot_id);
-      const auto sent =
-          key == keys.end() ? link->publish(channel, bytes) : publish_signed(channel, bytes, key->second);
-      if (!sent) return sent;
+      TRY(key == keys.end() ? link->publish(channel, bytes) : publish_signed(channel, bytes, key->second));
     }
     if (log) {
       TRY(log->write(emission.utime_us, channel, bytes));

@@ -15,7 +15,6 @@
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
-#include "client/lcm_url.h"
 #include "telemetry/log_recordings.h"
 
 namespace joulecast::client {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <span>
-
 #include "client/commands/outcome.h"
 
 namespace CLI {
@@ -10,40 +8,26 @@ class App;
 
 namespace joulecast::client {
 
-// Adds one subcommand to the program; when that subcommand is chosen, parsing runs it and leaves its outcome
-// in `exit`, which must outlive the parse.
-using AddCommand = void (*)(CLI::App& program, Exit& exit);
+// Every subcommand of joulecast, in the order that --help lists them. A new one is a file and a word here.
+// The command study adds `thesis` and `gap trial`, which execute joulecast-study: it comes after gap.
+// clang-format off
+#define FOR_EACH_COMMAND(DO)                                                                               \
+  DO(profile) DO(estimate) DO(autonomy) DO(matrix) DO(robots) DO(state) DO(missions) DO(ledger) DO(export) \
+  DO(proposals) DO(adopt) DO(check) DO(import) DO(replay) DO(spy) DO(simulate) DO(calibrate) DO(battery)   \
+  DO(gap) DO(effects) DO(store) DO(key) DO(token) DO(audit) DO(study) DO(completion)
+// clang-format on
 
-// Every subcommand of joulecast, in the order that --help lists them. A new one is a file and a line here.
-[[nodiscard]] std::span<const AddCommand> commands();
+#define DECLARE_COMMAND(name) void add_##name(CLI::App& program, Exit& exit);
+FOR_EACH_COMMAND(DECLARE_COMMAND)
+#undef DECLARE_COMMAND
 
-void add_adopt(CLI::App& program, Exit& exit);
-void add_audit(CLI::App& program, Exit& exit);
-void add_autonomy(CLI::App& program, Exit& exit);
-void add_battery(CLI::App& program, Exit& exit);
-void add_calibrate(CLI::App& program, Exit& exit);
-void add_check(CLI::App& program, Exit& exit);
-void add_completion(CLI::App& program, Exit& exit);
-void add_effects(CLI::App& program, Exit& exit);
-void add_estimate(CLI::App& program, Exit& exit);
-void add_export(CLI::App& program, Exit& exit);
-void add_gap(CLI::App& program, Exit& exit);
-void add_import(CLI::App& program, Exit& exit);
-void add_ledger(CLI::App& program, Exit& exit);
-void add_matrix(CLI::App& program, Exit& exit);
-void add_missions(CLI::App& program, Exit& exit);
-void add_profile(CLI::App& program, Exit& exit);
-void add_proposals(CLI::App& program, Exit& exit);
-void add_replay(CLI::App& program, Exit& exit);
-void add_robots(CLI::App& program, Exit& exit);
-void add_simulate(CLI::App& program, Exit& exit);
-void add_spy(CLI::App& program, Exit& exit);
-void add_state(CLI::App& program, Exit& exit);
-void add_store(CLI::App& program, Exit& exit);
-// Adds `thesis` and `gap trial`, which execute joulecast-study. To be called after add_gap.
-void add_study(CLI::App& program, Exit& exit);
-void add_key(CLI::App& program, Exit& exit);
-void add_token(CLI::App& program, Exit& exit);
+// Adds the subcommands to the program; when one is chosen, parsing runs it and leaves its outcome in `exit`,
+// which must outlive the parse.
+inline void add_commands(CLI::App& program, Exit& exit) {
+#define ADD_COMMAND(name) add_##name(program, exit);
+  FOR_EACH_COMMAND(ADD_COMMAND)
+#undef ADD_COMMAND
+}
 
 // Subcommands of export.
 void add_export_rmf(CLI::App& group, Exit& exit);

@@ -140,11 +140,9 @@ void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding
 // The newest diagnosis of each robot, where it names effects and no model was adopted since.
 Result<void> add_diagnoses(std::map<std::string, std::vector<AttentionReason>>& reasons,
                            const Services& services) {
-  const auto found =
-      services.store.diagnoses({}, std::numeric_limits<std::int64_t>::max(), history::max_page_size);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto found, services.store.diagnoses({}, history::whole_future, history::max_page_size));
   std::set<std::string> seen;
-  for (const history::DiagnosisRecord& d : *found) {
+  for (const history::DiagnosisRecord& d : found) {
     if (d.state != history::DiagnosisState::done || !seen.insert(d.robot_id).second) continue;
     const auto model = services.models.find(d.robot_id);
     const auto summary = nlohmann::json::parse(d.summary_json, nullptr, false);
@@ -241,30 +239,25 @@ std::vector<AttentionReason> reasons_from(const std::string& body_json) {
   return reasons;
 }
 
-const Table<AttentionReason>& reason_table() {
-  using A = Acknowledgement;
-  static const auto acknowledgement =
-      Table<A>()
-          .time("", &A::utime_us, "time of the acknowledgement, microseconds since 1970")
-          .text_or_null("by", &A::by, "name of the token; null: anonymous")
-          .value("note", &A::note, "note of the person");
-  using R = AttentionReason;
-  static const auto table =
-      Table<R>()
-          .word("kind", &R::kind, attention_kinds(), "the condition")
-          .word(
-              "severity", [](const R& r) { return name_of(r.severity); }, severity_names, "as above")
-          .time("since", &R::since_utime_us,
-                "start of the condition, microseconds since 1970; null: not available")
-          .value("message", &R::message, "the condition in one sentence, with its number")
-          .value("action", &R::action, "the required action, in one sentence")
-          .object("acknowledged", &R::acknowledged,
-                  "acknowledgement, valid until the condition ends; null: not acknowledged", acknowledgement);
-  return table;
-}
-
 const Table<AttentionEntry>& attention_entry_table() {
   using E = AttentionEntry;
+  static const auto acknowledgement =
+      Table<Acknowledgement>()
+          .time("", &Acknowledgement::utime_us, "time of the acknowledgement, microseconds since 1970")
+          .text_or_null("by", &Acknowledgement::by, "name of the token; null: anonymous")
+          .value("note", &Acknowledgement::note, "note of the person");
+  static const auto reason =
+      Table<AttentionReason>()
+          .word("kind", &AttentionReason::kind, attention_kinds(), "the condition")
+          .word(
+              "severity", [](const AttentionReason& r) { return name_of(r.severity); }, severity_names,
+              "as above")
+          .time("since", &AttentionReason::since_utime_us,
+                "start of the condition, microseconds since 1970; null: not available")
+          .value("message", &AttentionReason::message, "the condition in one sentence, with its number")
+          .value("action", &AttentionReason::action, "the required action, in one sentence")
+          .object("acknowledged", &AttentionReason::acknowledged,
+                  "acknowledgement, valid until the condition ends; null: not acknowledged", acknowledgement);
   static const auto table =
       Table<E>("A robot that needs attention")
           .named("attention-entry")
@@ -276,7 +269,7 @@ const Table<AttentionEntry>& attention_entry_table() {
           .value(
               "acknowledged", [](const E& e) { return e.reasons.front().acknowledged.has_value(); },
               "whether all its reasons are acknowledged")
-          .list("reasons", &E::reasons, "the unacknowledged ones first, then the most urgent", reason_table(),
+          .list("reasons", &E::reasons, "the unacknowledged ones first, then the most urgent", reason,
                 {{"minItems", 1}});
   return table;
 }

@@ -32,13 +32,8 @@ const described::Table<history::AuditEntry>& entry_table() {
 Result<Response> audit(const Services& services, const Request& request) {
   TRY_ASSIGN(const LogQuery query, log_query(request, usual_request_order));
   TRY_ASSIGN(const auto found, services.store.audit(query.behind_id, query.limit, query.filter));
-  JsonWriter out;
-  out.begin_object().key("entries").begin_array();
-  for (const history::AuditEntry& entry : found) entry_table().write(out, entry);
-  out.end_array();
-  write_id_cursor(out, found, query.limit, [](const history::AuditEntry& entry) { return entry.id; });
-  out.end_object();
-  return http::json_response(out.take());
+  return page_response("entries", found, entry_table(),
+                       next_id_cursor(found, query.limit, &history::AuditEntry::id));
 }
 
 }  // namespace

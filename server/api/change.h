@@ -10,7 +10,7 @@
 #include "history/commands.h"
 #include "history/records.h"
 #include "server/api/services.h"
-#include "server/http/idempotency.h"
+#include "server/http/router.h"
 
 namespace joulecast::api {
 

@@ -30,49 +30,6 @@ struct ClusterAnswer : server::ClusterStatus {
 
 const Schema counted{{"minimum", 0}};
 
-const Table<Node>& node_table() {
-  static const auto table =
-      Table<Node>()
-          .value("node", &Node::node, "cluster.node")
-          .value("address", &Node::address, "its address")
-          .value("version", &Node::version, "of the program")
-          .value(
-              "alive", [](const Node& node) { return node.expires_in_s > 0 && node.connected; },
-              "true while it renews its membership and its connection is open")
-          .value("joined_s", &Node::joined_s, "time since it joined, s", counted)
-          .value("lease_left_s", &Node::expires_in_s,
-                 "time until other daemons take over its robots unless it renews the lease, s")
-          .value("robots_kept", &Node::kept, "leases in its name", counted)
-          .value("robots_heard", &Node::heard, "robots from which it receives telemetry", counted);
-  return table;
-}
-
-const Table<HeldLease>& lease_table() {
-  using L = HeldLease;
-  static const auto table =
-      Table<L>()
-          .value("robot_id", &L::robot_id, "robot of the lease")
-          .value(
-              "node", [](const L& lease) { return lease.is_held ? std::optional(lease.node) : std::nullopt; },
-              "node that has the lease; null: none at present")
-          .value("epoch", &L::epoch, "increases with every change of the node", counted)
-          .value("taken_s", &L::taken_s, "time since the node took it, s", counted)
-          .value("takeovers", &L::takeovers, "number of takeovers from failed daemons", counted)
-          .time(
-              "stored",
-              [](const L& lease) {
-                return lease.position ? std::optional(lease.position->utime_us) : std::nullopt;
-              },
-              "robot's time of the last stored sample of a mission, µs since the Unix epoch")
-          .value(
-              "stored_sequence",
-              [](const L& lease) {
-                return lease.position ? std::optional(lease.position->sequence) : std::nullopt;
-              },
-              "its sequence number", counted);
-  return table;
-}
-
 const Table<server::ClusterStatus>& own_table() {
   using S = server::ClusterStatus;
   static const auto table =
@@ -96,6 +53,40 @@ const Table<server::ClusterStatus>& own_table() {
 
 const Table<ClusterAnswer>& cluster_table() {
   using C = ClusterAnswer;
+  static const auto node =
+      Table<Node>()
+          .value("node", &Node::node, "cluster.node")
+          .value("address", &Node::address, "its address")
+          .value("version", &Node::version, "of the program")
+          .value(
+              "alive", [](const Node& n) { return n.expires_in_s > 0 && n.connected; },
+              "true while it renews its membership and its connection is open")
+          .value("joined_s", &Node::joined_s, "time since it joined, s", counted)
+          .value("lease_left_s", &Node::expires_in_s,
+                 "time until other daemons take over its robots unless it renews the lease, s")
+          .value("robots_kept", &Node::kept, "leases in its name", counted)
+          .value("robots_heard", &Node::heard, "robots from which it receives telemetry", counted);
+  static const auto lease =
+      Table<HeldLease>()
+          .value("robot_id", &HeldLease::robot_id, "robot of the lease")
+          .value(
+              "node", [](const HeldLease& l) { return l.is_held ? std::optional(l.node) : std::nullopt; },
+              "node that has the lease; null: none at present")
+          .value("epoch", &HeldLease::epoch, "increases with every change of the node", counted)
+          .value("taken_s", &HeldLease::taken_s, "time since the node took it, s", counted)
+          .value("takeovers", &HeldLease::takeovers, "number of takeovers from failed daemons", counted)
+          .time(
+              "stored",
+              [](const HeldLease& l) {
+                return l.position ? std::optional(l.position->utime_us) : std::nullopt;
+              },
+              "robot's time of the last stored sample of a mission, µs since the Unix epoch")
+          .value(
+              "stored_sequence",
+              [](const HeldLease& l) {
+                return l.position ? std::optional(l.position->sequence) : std::nullopt;
+              },
+              "its sequence number", counted);
   static const auto table =
       Table<C>("Cluster")
           .text_or_null("name", &C::name, "cluster.name; null: this daemon is in no cluster")
@@ -105,8 +96,8 @@ const Table<ClusterAnswer>& cluster_table() {
           .number_or_null("renewed_s", &C::renewed_s, "time since it renewed its membership, s; null: never",
                           counted)
           .text_or_null("error", &C::error, "error of the connection to the database; null: none")
-          .list("nodes", &C::nodes, "the daemons of the cluster, this one among them", node_table())
-          .list("leases", &C::leases, "leases of all robots that were ever kept", lease_table())
+          .list("nodes", &C::nodes, "the daemons of the cluster, this one among them", node)
+          .list("leases", &C::leases, "leases of all robots that were ever kept", lease)
           .object("own", std::identity(), "counters of the responding daemon", own_table());
   return table;
 }

@@ -55,9 +55,15 @@ Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
   return id;
 }
 
-void write_cursor(JsonWriter& json, std::string_view cursor) {
-  json.key("next_cursor");
-  cursor.empty() ? json.null() : json.value(cursor);
+std::pair<std::vector<std::string>, std::string> page_of_ids(const http::Request& request,
+                                                             const std::set<std::string>& ids,
+                                                             std::int64_t limit) {
+  const history::PageRequest wanted = page_of(request, limit);
+  std::vector<std::string> page;
+  auto next = ids.upper_bound(wanted.cursor);
+  while (std::cmp_less(page.size(), wanted.limit) && next != ids.end()) page.push_back(*next++);
+  std::string cursor = next == ids.end() ? "" : page.back();
+  return {std::move(page), std::move(cursor)};
 }
 
 std::vector<Parameter> log_parameters(std::string kinds, std::string_view usual_order) {

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -30,17 +33,36 @@ http::Parameter limit_parameter(std::string things, std::int64_t maximum);
 http::Parameter cursor_parameter();
 // The cursor as an id: the page begins after it, in the list's order. Fault::invalid for any other text.
 Result<std::optional<std::int64_t>> id_cursor(const http::Request& request);
-// "next_cursor": null where `cursor` is empty.
-void write_cursor(JsonWriter& json, std::string_view cursor);
 // The id of the last item as the next cursor; empty if the page is not full.
 template <class Items, class Id>
 std::string next_id_cursor(const Items& items, std::int64_t limit, Id id_of) {
-  return std::cmp_less(items.size(), limit) ? "" : std::to_string(id_of(items.back()));
+  return std::cmp_less(items.size(), limit) ? "" : std::to_string(std::invoke(id_of, items.back()));
 }
-template <class Items, class Id>
-void write_id_cursor(JsonWriter& json, const Items& items, std::int64_t limit, Id id_of) {
-  write_cursor(json, next_id_cursor(items, limit, id_of));
+
+// A page of a list: the members that `head` writes, the items by `write`, a table or a function, and
+// "next_cursor", null where `cursor` is empty.
+template <class Items, class Write>
+http::Response page_response(
+    std::string_view name, const Items& items, const Write& write, std::string_view cursor,
+    const std::function<void(JsonWriter&)>& head = [](JsonWriter&) {}) {
+  JsonWriter json;
+  head(json.begin_object());
+  json.key(name).begin_array();
+  for (const auto& item : items) {
+    if constexpr (std::is_invocable_v<Write, JsonWriter&, decltype(item)>)
+      write(json, item);
+    else
+      write.write(json, item);
+  }
+  json.end_array().key("next_cursor");
+  cursor.empty() ? json.null() : json.value(cursor);
+  return http::json_response(json.end_object().take());
 }
+
+// The page of ids that ?cursor= and ?limit= select, and the next cursor; empty: it is the last.
+std::pair<std::vector<std::string>, std::string> page_of_ids(const http::Request& request,
+                                                             const std::set<std::string>& ids,
+                                                             std::int64_t limit);
 
 // Of a log of events or requests: ?kind= with `kinds`, ?order= with its default, ?from=, ?to=, ?limit= and
 // ?cursor=.

@@ -42,23 +42,10 @@ double done_share(const DiagnosisAnswer& a) {
 // Without the result.
 const Table<DiagnosisAnswer>& job_table() {
   using A = DiagnosisAnswer;
-  using R = DiagnosisRecord;
-  static const auto stored =
-      Table<R>()
-          .time("finished", &R::finished_utime_us, "its end; null: not ended")
-          .value("model_version", &R::model_version, "the model that was diagnosed")
-          .integers("fitted_on", &R::fitted_on, "diagnosed missions")
-          .integers("held_back", &R::held_back, "missions held back for a back-test")
-          .text_or_null("error", &R::error, "reason of its failure; null: not failed")
-          .json("request", &R::request_json, "the request that started it", described::of_type("object"));
   static const auto table =
       Table<A>()
-          .value(
-              "id", [](const A& a) { return a.record.id; },
-              "number of the diagnosis, as in /v1/diagnoses/{id}")
-          .value(
-              "robot_id", [](const A& a) -> const std::string& { return a.record.robot_id; },
-              "the robot that is diagnosed")
+          .value("id", AT(record.id), "number of the diagnosis, as in /v1/diagnoses/{id}")
+          .value("robot_id", AT(record.robot_id), "the robot that is diagnosed")
           .word(
               "state", [](const A& a) { return history::name(state_of(a)); },
               history::names_of<history::DiagnosisState>, "interrupted: the service stopped while it ran")
@@ -70,16 +57,21 @@ const Table<DiagnosisAnswer>& job_table() {
           .value(
               "ahead", [](const A& a) { return a.progress ? a.progress->ahead : a.ahead; },
               "jobs before it in the queue")
-          .time(
-              "created", [](const A& a) { return a.record.created_utime_us; },
-              "time of creation, microseconds since 1970 by the host's clock")
+          .time("created", AT(record.created_utime_us),
+                "time of creation, microseconds since 1970 by the host's clock")
           .time(
               "started",
               [](const A& a) {
                 return a.progress ? a.progress->started_utime_us : a.record.started_utime_us;
               },
               "start of its execution; null: not started")
-          .include(stored, [](const A& a) -> const R& { return a.record; });
+          .time("finished", AT(record.finished_utime_us), "its end; null: not ended")
+          .value("model_version", AT(record.model_version), "the model that was diagnosed")
+          .integers("fitted_on", AT(record.fitted_on), "diagnosed missions")
+          .integers("held_back", AT(record.held_back), "missions held back for a back-test")
+          .text_or_null("error", AT(record.error), "reason of its failure; null: not failed")
+          .json("request", AT(record.request_json), "the request that started it",
+                described::of_type("object"));
   return table;
 }
 
@@ -89,9 +81,8 @@ const Table<DiagnosisAnswer>& listed_diagnosis_table() {
       Table<A>("A diagnosis of a list, or that has ended")
           .named("listed-diagnosis")
           .include(job_table(), std::identity())
-          .json(
-              "summary", [](const A& a) -> const std::string& { return a.record.summary_json; },
-              "verdict, gap, effects and shrinkage of the result", described::of_type("object", true));
+          .json("summary", AT(record.summary_json), "verdict, gap, effects and shrinkage of the result",
+                described::of_type("object", true));
   return table;
 }
 
@@ -100,13 +91,12 @@ const Table<DiagnosisAnswer>& diagnosis_table() {
   static const auto table =
       Table<A>("A diagnosis of the gap between a robot and its model")
           .include(job_table(), std::identity())
-          .json(
-              "result", [](const A& a) -> const std::string& { return a.record.result_json; },
-              "output of `joulecast gap --json`; results of earlier versions lack members that were added "
-              "later",
-              described::or_null(described::of_reference("gap"), true))
+          .json("result", AT(record.result_json),
+                "output of `joulecast gap --json`; results of earlier versions lack members that were added "
+                "later",
+                described::or_null(described::of_reference("gap"), true))
           .compact_json(
-              "model", [](const A& a) -> const std::string& { return a.record.model_json; },
+              "model", AT(record.model_json),
               "robot file with the estimated effects applied; null: no effect was found, or one of several "
               "effects must be selected first",
               described::of_type("object", true));
@@ -172,16 +162,12 @@ Result<Response> list_diagnoses(const Services& services, const Request& request
   TRY_ASSIGN(const auto cursor, id_cursor(request));
   TRY_ASSIGN(const auto found,
              services.store.diagnoses(robot, cursor.value_or(history::whole_future), limit));
-  const auto id_of = [](const history::DiagnosisRecord& d) { return d.id; };
-  if (request.csv) return list_diagnoses_csv(services, request, found, next_id_cursor(found, limit, id_of));
-  JsonWriter out;
-  out.begin_object().key("diagnoses").begin_array();
-  for (const history::DiagnosisRecord& d : found)
+  const std::string next = next_id_cursor(found, limit, &DiagnosisRecord::id);
+  if (request.csv) return list_diagnoses_csv(services, request, found, next);
+  const auto write = [&](JsonWriter& out, const DiagnosisRecord& d) {
     listed_diagnosis_table().write(out, {d, services.diagnoses.progress(d.id)});
-  out.end_array();
-  write_id_cursor(out, found, limit, id_of);
-  out.end_object();
-  return http::json_response(out.take());
+  };
+  return page_response("diagnoses", found, write, next);
 }
 
 Result<Response> report(const Services& services, const Request& request) {

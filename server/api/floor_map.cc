@@ -60,99 +60,81 @@ std::vector<Square> squares_of(const FloorAnswer& answer) {
 
 const described::Schema at_least_0{{"minimum", 0}};
 
-const Table<FloorZone>& zone_table() {
-  using Z = FloorZone;
-  static const auto table =
-      Table<Z>()
-          .value("x_min_m", &Z::x_min_m, "m, left of the zone")
-          .value("y_min_m", &Z::y_min_m, "m, below the zone")
-          .value("x_max_m", &Z::x_max_m, "m, right of the zone")
-          .value("y_max_m", &Z::y_max_m, "m, above the zone")
-          .value("cells", &Z::cells, "squares in it", at_least_0)
-          .value("covered_s", &Z::covered_s, "s, spent in it", at_least_0)
-          .value("distance_m", &Z::distance_m, "m, driven in it", at_least_0)
-          .value("departure", &Z::departure, "departure of the zone, defined as that of a square")
-          .value("excess_j", &Z::excess_j, "J, in excess of the expected energy, in the evaluated missions");
-  return table;
-}
-
 const Table<Square>& square_table() {
-  using C = FloorCell;
   using S = Square;
-  static const auto place =
-      Table<C>()
-          .value("x_m", &C::x_m, "m, the square's corner of least coordinates, in the robots' map frame")
-          .value("y_m", &C::y_m, "m, likewise")
-          .value("missions", &C::missions, "missions that crossed it", at_least_0)
-          .value("robots", &C::robots, "robots that crossed it", at_least_0)
-          .value("covered_s", &C::covered_s, "s, spent in it", at_least_0)
-          .value("distance_m", &C::distance_m, "m, driven in it", at_least_0)
-          .value("energy_j", &C::energy_j, "J, from the battery: measured where available, else modelled");
-  static const auto gap =
-      Table<C>()
-          .value("measured_j", &C::measured_j,
-                 "J, measured by the sensors in the seconds of driving that have both measured and modelled "
-                 "power")
-          .value("modelled_j", &C::modelled_j, "J, by the models, over the same seconds")
-          .number_or_null(
-              "ratio", [](const C& c) { return ratio(c.measured_j, c.modelled_j); },
-              "measured_j / modelled_j; null where the latter is not positive")
-          .number_or_null("departure", &C::departure,
-                          "relative excess of measured energy over modelled energy times the usual ratio of "
-                          "each mission; null: too few missions measured here")
-          .numbers("departure_ci", &C::interval, "95 % interval of departure, with missions as the units")
-          .value("stands_out", &C::stands_out,
-                 "departs by 5 % or more, and significantly, allowing for the number of squares");
-  const auto cell = [](const S& square) -> const FloorCell& { return square.cell; };
   static const auto table =
       Table<S>()
-          .include(place, cell)
+          .value("x_m", AT(cell.x_m), "m, the square's corner of least coordinates, in the robots' map frame")
+          .value("y_m", AT(cell.y_m), "m, likewise")
+          .value("missions", AT(cell.missions), "missions that crossed it", at_least_0)
+          .value("robots", AT(cell.robots), "robots that crossed it", at_least_0)
+          .value("covered_s", AT(cell.covered_s), "s, spent in it", at_least_0)
+          .value("distance_m", AT(cell.distance_m), "m, driven in it", at_least_0)
+          .value("energy_j", AT(cell.energy_j),
+                 "J, from the battery: measured where available, else modelled")
           .number_or_null(
               "energy_j_per_m", [](const S& s) { return s.cell.energy_per_distance_j_m(s.side_m); },
               "J/m while driving; null where less than half a side was driven")
-          .include(gap, cell);
+          .value("measured_j", AT(cell.measured_j),
+                 "J, measured by the sensors in the seconds of driving that have both measured and modelled "
+                 "power")
+          .value("modelled_j", AT(cell.modelled_j), "J, by the models, over the same seconds")
+          .number_or_null(
+              "ratio", [](const S& s) { return ratio(s.cell.measured_j, s.cell.modelled_j); },
+              "measured_j / modelled_j; null where the latter is not positive")
+          .number_or_null("departure", AT(cell.departure),
+                          "relative excess of measured energy over modelled energy times the usual ratio of "
+                          "each mission; null: too few missions measured here")
+          .numbers("departure_ci", AT(cell.interval),
+                   "95 % interval of departure, with missions as the units")
+          .value("stands_out", AT(cell.stands_out),
+                 "departs by 5 % or more, and significantly, allowing for the number of squares");
   return table;
 }
 
 const Table<FloorAnswer>& floor_map_table() {
   using B = FloorBounds;
+  static const auto zone =
+      Table<FloorZone>()
+          .value("x_min_m", &FloorZone::x_min_m, "m, left of the zone")
+          .value("y_min_m", &FloorZone::y_min_m, "m, below the zone")
+          .value("x_max_m", &FloorZone::x_max_m, "m, right of the zone")
+          .value("y_max_m", &FloorZone::y_max_m, "m, above the zone")
+          .value("cells", &FloorZone::cells, "squares in it", at_least_0)
+          .value("covered_s", &FloorZone::covered_s, "s, spent in it", at_least_0)
+          .value("distance_m", &FloorZone::distance_m, "m, driven in it", at_least_0)
+          .value("departure", &FloorZone::departure, "departure of the zone, defined as that of a square")
+          .value("excess_j", &FloorZone::excess_j,
+                 "J, in excess of the expected energy, in the evaluated missions");
   static const auto bounds = Table<B>()
                                  .value("x_min_m", &B::x_min_m, "m, left of all squares")
                                  .value("y_min_m", &B::y_min_m, "m, below all squares")
                                  .value("x_max_m", &B::x_max_m, "m, right of all squares")
                                  .value("y_max_m", &B::y_max_m, "m, above all squares");
   using A = FloorAnswer;
-  using M = FloorMap;
-  static const auto sums =
-      Table<M>()
-          .value("cell_m", &M::cell_m, "m, side of a square", {{"exclusiveMinimum", 0}})
-          .value(
-              "missions", [](const M& m) { return m.reading.missions; },
-              "missions that started in the period, without annulled and contradicted ones", at_least_0)
-          .value(
-              "missions_read", [](const M& m) { return m.reading.missions_read; },
-              "evaluated missions: all, or an evenly distributed sample; the sums are of these", at_least_0)
-          .value(
-              "seconds_read", [](const M& m) { return m.reading.points; },
-              "evaluated seconds of their traces", at_least_0)
-          .texts("robots", &M::robots, "robots of the evaluated missions")
-          .value("covered_s", &M::covered_s, "s, in all squares", at_least_0)
-          .value("distance_m", &M::distance_m, "m, in all squares", at_least_0)
-          .value("energy_j", &M::energy_j, "J, in all squares")
-          .value("measured_j", &M::measured_j, "J, in all squares")
-          .value("modelled_j", &M::modelled_j, "J, in all squares")
-          .number_or_null(
-              "ratio", [](const M& m) { return ratio(m.measured_j, m.modelled_j); },
-              "measured_j / modelled_j");
   static const auto table =
       Table<A>("Energy and gap by squares of the floor")
-          .include(sums, [](const A& a) -> const M& { return a.map; })
+          .value("cell_m", AT(map.cell_m), "m, side of a square", {{"exclusiveMinimum", 0}})
+          .value("missions", AT(map.reading.missions),
+                 "missions that started in the period, without annulled and contradicted ones", at_least_0)
+          .value("missions_read", AT(map.reading.missions_read),
+                 "evaluated missions: all, or an evenly distributed sample; the sums are of these",
+                 at_least_0)
+          .value("seconds_read", AT(map.reading.points), "evaluated seconds of their traces", at_least_0)
+          .texts("robots", AT(map.robots), "robots of the evaluated missions")
+          .value("covered_s", AT(map.covered_s), "s, in all squares", at_least_0)
+          .value("distance_m", AT(map.distance_m), "m, in all squares", at_least_0)
+          .value("energy_j", AT(map.energy_j), "J, in all squares")
+          .value("measured_j", AT(map.measured_j), "J, in all squares")
+          .value("modelled_j", AT(map.modelled_j), "J, in all squares")
+          .number_or_null(
+              "ratio", [](const A& a) { return ratio(a.map.measured_j, a.map.modelled_j); },
+              "measured_j / modelled_j")
           .object("bounds", bounds_of, "of the driven floor; null: no position is stored", bounds)
-          .list(
-              "zones", [](const A& a) -> const auto& { return a.map.zones; },
-              "groups of adjacent squares with a departure of the same sign, in descending order of excess "
-              "energy",
-              zone_table())
+          .list("zones", AT(map.zones),
+                "groups of adjacent squares with a departure of the same sign, in descending order of excess "
+                "energy",
+                zone)
           .value(
               "cells_total", [](const A& a) { return a.map.cells.size(); },
               "number of squares, of which at most limit are listed", at_least_0)
@@ -184,12 +166,12 @@ Result<Response> floor_map(const Services& services, const Request& request) {
   filter.start_to_utime_us = to;
   const double cell_m = request.query_number("cell_m").value_or(usual_cell_m);
   answers::FloorMapper mapper(cell_m);
-  const auto read = services.store.floor_visits(
-      filter, cell_m, history::max_floor_points, [&](const history::FloorMission& mission) {
-        return !request.stop.stop_requested() && mapper.add(mission);
-      });
-  if (!read) return tl::unexpected(read.error());
-  TRY_ASSIGN(const auto map, mapper.finish(*read));
+  TRY_ASSIGN(const auto read, services.store.floor_visits(filter, cell_m, history::max_floor_points,
+                                                          [&](const history::FloorMission& mission) {
+                                                            return !request.stop.stop_requested() &&
+                                                                   mapper.add(mission);
+                                                          }));
+  TRY_ASSIGN(const auto map, mapper.finish(read));
   const auto limit = static_cast<std::size_t>(request.query_integer("limit").value_or(usual_cells));
   if (request.csv) return csv_of(request, map, limit);
   return http::json_response(floor_map_table().text({map, limit}));

@@ -37,19 +37,6 @@ constexpr std::string_view start_words = "start of the mission, microseconds sin
 constexpr std::string_view version_words = "the version then in force";
 constexpr std::string_view robot_words = "the robot's id, as in its telemetry and its file";
 
-const Table<drift::MissionRatio>& ratio_table() {
-  using M = drift::MissionRatio;
-  static const auto table = Table<M>()
-                                .value("id", &M::mission_key, "as in /v1/missions/{id}")
-                                .time("start", &M::utime_us, start_words)
-                                .value("model_version", &M::model_version, version_words)
-                                .value("measured_j", &M::measured_j,
-                                       "energy from the battery by the sensors of voltage and current")
-                                .value("modelled_j", &M::modelled_j, "where measured")
-                                .value("ratio", &M::ratio, "measured / modelled");
-  return table;
-}
-
 // Of the back-test with which the version was adopted.
 std::optional<double> error_of(const history::ModelVersion& version, const char* name) {
   const Json evidence = Json::parse(version.evidence_json, nullptr, false);
@@ -87,30 +74,35 @@ const Table<history::ModelVersion>& version_table() {
   return table;
 }
 
-const Table<drift::SiblingRatio>& sibling_table() {
-  using S = drift::SiblingRatio;
-  static const auto table =
-      Table<S>()
-          .value("robot_id", &S::robot_id, robot_words)
-          .value("missions", &S::missions, "number of missions")
-          .value("ratio", &S::ratio, "median of measured over modelled energy")
-          .numbers("ci", &S::interval, "95 % interval")
-          .value("deviation", &S::deviation, "robust standard deviations from the kind's median")
-          .value("stands_out", &S::stands_out, "whether it differs significantly from the others");
-  return table;
-}
-
 const Table<GapHistory>& gap_history_table() {
   using G = GapHistory;
+  static const auto sibling =
+      Table<drift::SiblingRatio>()
+          .value("robot_id", &drift::SiblingRatio::robot_id, robot_words)
+          .value("missions", &drift::SiblingRatio::missions, "number of missions")
+          .value("ratio", &drift::SiblingRatio::ratio, "median of measured over modelled energy")
+          .numbers("ci", &drift::SiblingRatio::interval, "95 % interval")
+          .value("deviation", &drift::SiblingRatio::deviation,
+                 "robust standard deviations from the kind's median")
+          .value("stands_out", &drift::SiblingRatio::stands_out,
+                 "whether it differs significantly from the others");
+  static const auto ratio = Table<drift::MissionRatio>()
+                                .value("id", &drift::MissionRatio::mission_key, "as in /v1/missions/{id}")
+                                .time("start", &drift::MissionRatio::utime_us, start_words)
+                                .value("model_version", &drift::MissionRatio::model_version, version_words)
+                                .value("measured_j", &drift::MissionRatio::measured_j,
+                                       "energy from the battery by the sensors of voltage and current")
+                                .value("modelled_j", &drift::MissionRatio::modelled_j, "where measured")
+                                .value("ratio", &drift::MissionRatio::ratio, "measured / modelled");
   static const auto table =
       Table<G>("A robot's gap by mission")
           .value("robot_id", &G::robot_id, robot_words)
           .value("model_version", &G::model_version, "version in force")
           .list("missions", &G::missions, "measured over modelled energy of each mission, oldest first",
-                ratio_table())
+                ratio)
           .list("drift", &G::marks, "detected changes of the robot", answers::mark_table())
           .list("versions", &G::versions, "versions of the model, newest first", version_table())
-          .list("siblings", &G::siblings, "robots of this kind, this one among them", sibling_table());
+          .list("siblings", &G::siblings, "robots of this kind, this one among them", sibling);
   return table;
 }
 
@@ -163,15 +155,9 @@ const described::Table<history::Event>& event_table() {
 Result<Response> list_events(const Services& services, const Request& request) {
   TRY_ASSIGN(const LogQuery query, log_query(request, usual_event_order));
   TRY_ASSIGN(const auto found, services.store.events(query.behind_id, query.limit, query.filter));
-  const auto id_of = [](const history::Event& e) { return e.id; };
-  if (request.csv) return event_csv(request, found, next_id_cursor(found, query.limit, id_of));
-  JsonWriter out;
-  out.begin_object().key("events").begin_array();
-  for (const history::Event& e : found) event_table().write(out, e);
-  out.end_array();
-  write_id_cursor(out, found, query.limit, id_of);
-  out.end_object();
-  return http::json_response(out.take());
+  const std::string next = next_id_cursor(found, query.limit, &history::Event::id);
+  if (request.csv) return event_csv(request, found, next);
+  return page_response("events", found, event_table(), next);
 }
 
 }  // namespace

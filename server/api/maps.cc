@@ -52,17 +52,13 @@ const Table<Place>& place_table() {
   return table;
 }
 
-const Table<std::array<double, 2>>& charger_table() {
-  static const auto table =
+const Table<FloorPlan>& plan_table() {
+  static const auto charger =
       Table<std::array<double, 2>>()
           .value(
               "x_m", [](const std::array<double, 2>& at) { return at[0]; }, "place in the map")
           .value(
               "y_m", [](const std::array<double, 2>& at) { return at[1]; }, "place in the map");
-  return table;
-}
-
-const Table<FloorPlan>& plan_table() {
   static const auto table =
       Table<FloorPlan>("Plan of one level of a map")
           .value("map", &FloorPlan::map, "name of the map")
@@ -75,25 +71,21 @@ const Table<FloorPlan>& plan_table() {
           .value("origin_y_m", &FloorPlan::origin_y_m, "place of the image's lower left corner in the map")
           .value("origin_yaw_rad", &FloorPlan::origin_yaw_rad,
                  "rotation of the image about that corner, counterclockwise")
-          .list("chargers", &FloorPlan::chargers, "places of chargers", charger_table());
+          .list("chargers", &FloorPlan::chargers, "places of chargers", charger);
   return table;
 }
 
-const Table<RobotPlace>& robot_place_table() {
-  static const auto table =
+const Table<Maps>& maps_table() {
+  static const auto robot_place =
       Table<RobotPlace>()
           .value("robot_id", &RobotPlace::robot_id, "the robot's id, as in its telemetry")
           .include(place_table(), &RobotPlace::place)
           .value("reported", &RobotPlace::reported,
                  "true: by the robot's covariates map=NAME and level=NAME, which override its settings");
-  return table;
-}
-
-const Table<Maps>& maps_table() {
   static const auto table =
       Table<Maps>("Floor plans, and the map and level of every robot")
           .list("levels", &Maps::levels, "levels with a plan, by map and level", plan_table())
-          .list("robots", &Maps::robots, "all robots, by id", robot_place_table());
+          .list("robots", &Maps::robots, "all robots, by id", robot_place);
   return table;
 }
 

@@ -5,7 +5,6 @@
 #include <optional>
 #include <utility>
 
-#include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "base/utc_time.h"
@@ -154,13 +153,8 @@ Result<Response> list_missions(const Services& services, const Request& request)
   TRY_ASSIGN(history::MissionPage found,
              past.history.missions(filter, page_of(request, 50), sort_of(request)));
   if (request.csv) return told_staleness(list_missions_csv(request, found), past);
-  JsonWriter json;
-  json.begin_object().key("missions").begin_array();
-  for (const history::Mission& mission : found.missions) answers::mission_table().write(json, mission);
-  json.end_array();
-  write_cursor(json, found.next_cursor);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  return told_staleness(
+      page_response("missions", found.missions, answers::mission_table(), found.next_cursor), past);
 }
 
 // Missions that are summed together.
@@ -249,28 +243,24 @@ const Table<history::Totals>& totals_table() {
   return table;
 }
 
-const Table<Group>& group_table() {
-  constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
-  static const auto table =
-      Table<Group>()
-          .texts("robots", &Group::robot_ids, "robots of the group, if grouped by robot or kind; else empty")
-          .time("from", &Group::from_utime_us, time_words)
-          .time("to", &Group::to_utime_us, time_words)
-          .include(totals_table(), &Group::totals, "as above, of this group");
-  return table;
-}
-
 struct TotalsAnswer {
   history::Totals all;
   std::optional<std::vector<Group>> groups;
 };
 
 const Table<TotalsAnswer>& totals_answer_table() {
+  constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
+  static const auto group =
+      Table<Group>()
+          .texts("robots", &Group::robot_ids, "robots of the group, if grouped by robot or kind; else empty")
+          .time("from", &Group::from_utime_us, time_words)
+          .time("to", &Group::to_utime_us, time_words)
+          .include(totals_table(), &Group::totals, "as above, of this group");
   static const auto table =
       Table<TotalsAnswer>("Sums over missions; null where no mission measured")
           .include(totals_table(), &TotalsAnswer::all)
           .list("groups", &TotalsAnswer::groups,
-                "the sums of each group that has missions; null without group_by", group_table());
+                "the sums of each group that has missions; null without group_by", group);
   return table;
 }
 

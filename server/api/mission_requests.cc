@@ -100,40 +100,34 @@ const described::Table<Requested>& requested_table() {
           .value("robot_id", &R::robot_id, "id of the robot")
           .word(
               "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
-          .value(
-              "mission_id", [](const R& r) -> const std::string& { return r.event.mission_id; },
-              "as in the request")
-          .time(
-              "", [](const R& r) { return r.event.utime_us; },
-              "when the mission begins or ends, by the robot's clock as of its last sample")
-          .number_or_null(
-              "payload_kg", [](const R& r) { return r.event.payload_kg; }, "as in the request")
-          .value(
-              "note", [](const R& r) -> const std::string& { return r.event.note; }, "as in the request");
+          .value("mission_id", AT(event.mission_id), "as in the request")
+          .time("", AT(event.utime_us),
+                "when the mission begins or ends, by the robot's clock as of its last sample")
+          .number_or_null("payload_kg", AT(event.payload_kg), "as in the request")
+          .value("note", AT(event.note), "as in the request");
   return table;
 }
 
 Result<Response> request_mission(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY(model_of(services, id));
-  Result<MissionEvent> event = mission_event_input().read(*request.json);
-  if (!event) return tl::unexpected(std::move(event.error()));
+  TRY_ASSIGN(MissionEvent event, mission_event_input().read(*request.json));
   TRY_ASSIGN(auto requests, ingest::stored_mission_requests(services.store, id));
   const auto snapshot = services.fleet.find(id);
   const ingest::RobotSnapshot now = snapshot != nullptr ? *snapshot : ingest::RobotSnapshot{};
-  TRY(check_order(*event, open_mission(now, requests)));
+  TRY(check_order(event, open_mission(now, requests)));
   const std::int64_t host_us = services.now_utime_us();
-  event->utime_us = robot_utime_us(now, host_us, requests);
-  if (const auto fault = telemetry::check_plausible(*event))
+  event.utime_us = robot_utime_us(now, host_us, requests);
+  if (const auto fault = telemetry::check_plausible(event))
     return invalid(
         "/" + (fault->field == "payload_mass" ? std::string("payload_kg") : std::string(fault->field)),
         telemetry::describe(*fault));
   const std::int64_t before_us = requests.empty() ? 0 : requests.back().request_utime_us;
-  const MissionRequest accepted{*event, std::max(host_us, before_us + 1)};
+  const MissionRequest accepted{event, std::max(host_us, before_us + 1)};
   requests.push_back(accepted);
 
   RequestChange request_change(services, request);
-  history::Change change = request_change.answered_by([id, event = *event](std::int64_t) {
+  history::Change change = request_change.answered_by([id, event](std::int64_t) {
     Response response = http::json_response(requested_table().text({id, event}));
     response.status = 202;
     return response;

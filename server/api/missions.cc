@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "describe/input.h"
@@ -106,30 +105,28 @@ const described::Input<Annulment>& annulment_input() {
 // the reason.
 Result<Response> annul(Services& services, const Request& request) {
   TRY_ASSIGN(const auto [reason], annulment_input().read(*request.json));
-  Result<history::Mission> mission = mission_of(services, request);
-  if (!mission) return tl::unexpected(mission.error());
-  if (mission->state == history::MissionState::open)
+  TRY_ASSIGN(history::Mission mission, mission_of(services, request));
+  if (mission.state == history::MissionState::open)
     return fail(Fault::conflict, "id", "the mission is still open; only one that ended can be annulled");
-  if (!history::findings_of(*mission).annulled.empty())
+  if (!history::findings_of(mission).annulled.empty())
     return fail(Fault::conflict, "id", "the mission is annulled already");
   const std::int64_t now = services.now_utime_us();
-  mission->findings_json = history::annulled_findings(*mission, now, reason);
+  mission.findings_json = history::annulled_findings(mission, now, reason);
   const nlohmann::json detail{
-      {"mission", mission->key}, {"mission_id", mission->mission_id}, {"reason", reason}};
+      {"mission", mission.key}, {"mission_id", mission.mission_id}, {"reason", reason}};
   std::vector<history::Command> commands{
-      history::AppendEvent{{0, now, mission->robot_id, "mission_annulled",
+      history::AppendEvent{{0, now, mission.robot_id, "mission_annulled",
                             detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}}};
-  const auto model = services.models.find(mission->robot_id);
-  if (auto learned = model ? services.forecasts.forget(model, mission->start_utime_us) : std::nullopt)
+  const auto model = services.models.find(mission.robot_id);
+  if (auto learned = model ? services.forecasts.forget(model, mission.start_utime_us) : std::nullopt)
     commands.emplace_back(history::PutLearned{std::move(*learned)});
   RequestChange request_change(services, request);
-  history::Change change = request_change.answered_by([mission = *mission](std::int64_t) {
-    return http::json_response(answers::mission_table().text(mission));
-  });
-  change.command = history::CheckpointMission{*mission, {}, {}, std::nullopt};
+  history::Change change = request_change.answered_by(
+      [mission](std::int64_t) { return http::json_response(answers::mission_table().text(mission)); });
+  change.command = history::CheckpointMission{mission, {}, {}, std::nullopt};
   change.add_before([commands = std::move(commands)](std::int64_t) { return commands; });
   const history::Outcome done = services.writer.execute(std::move(change));
-  if (!done && model) services.forecasts.learnt_elsewhere(mission->robot_id);  // as it is stored
+  if (!done && model) services.forecasts.learnt_elsewhere(mission.robot_id);  // as it is stored
   return request_change.result(done);
 }
 
@@ -241,8 +238,7 @@ const Table<TraceAnswer>& trace_table() {
   static const auto table =
       Table<A>("A mission over time, in columns")
           .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
-          .value(
-              "width_us", [](const A& a) { return a.trace.width_us; }, "length of each span")
+          .value("width_us", AT(trace.width_us), "length of each span")
           .integers("start_utime_us", of_spans(&B::start_utime_us),
                     "start of each span, microseconds since 1970 by the robot's clock")
           .column("covered_s", of_spans(&B::covered_s), "time of each span with telemetry", 6, true)
@@ -331,9 +327,7 @@ Table<TelemetryAnswer> make_telemetry() {
       table.exact(
           name, [k](const A& a) { return numbers_of(a, k); }, words_of(field.key));
   }
-  table.text_or_null(
-      "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
-      described::cursor_words);
+  table.text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
   return table;
 }
 
@@ -369,9 +363,7 @@ const Table<CovariatesAnswer>& covariates_table() {
           .list(
               "covariates", [](const A& a) { return signals::series_of(a.page.changes); },
               "in the order of their first change in the page", series)
-          .text_or_null(
-              "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
-              described::cursor_words);
+          .text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
   return table;
 }
 

@@ -103,11 +103,10 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     if (diagnosis.robot_id != robot_id)
       return invalid("/diagnosis_id", "belongs to robot " + diagnosis.robot_id + ", not to " + robot_id);
     // A test does not require a model that can be adopted.
-    Result<server::DiagnosedModel> diagnosed =
-        server::diagnosed_model(services.store, diagnosis, {r.effects, r.force || r.dry_run});
-    if (!diagnosed) return tl::unexpected(std::move(diagnosed.error()));
-    model = std::move(diagnosed->model);
-    adoption.overridden = std::move(diagnosed->overridden);
+    TRY_ASSIGN(server::DiagnosedModel diagnosed,
+               server::diagnosed_model(services.store, diagnosis, {r.effects, r.force || r.dry_run}));
+    model = std::move(diagnosed.model);
+    adoption.overridden = std::move(diagnosed.overridden);
     adoption.origin = history::ModelOrigin::diagnosis;
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
     fitted_on = std::move(diagnosis.fitted_on);
@@ -282,26 +281,13 @@ const described::Table<ProposalAnswer>& proposal_table() {
   using described::of_type;
   using described::Table;
   using A = ProposalAnswer;
-  using P = history::Proposal;
-  static const auto head = Table<P>()
-                               .value("id", &P::id, "number of the proposal")
-                               .value("robot_id", &P::robot_id, "robot with the model to change")
-                               .time("created", &P::created_utime_us,
-                                     "time of creation, microseconds since 1970 by the host's clock")
-                               .value("kind", &P::kind, "calibration: refined by the robot's own missions");
-  static const auto content =
-      Table<P>()
-          .value("note", &P::note, "summary of the change, in a sentence")
-          .value("base_version", &P::base_version, "version of the model that it changes")
-          .value("adopted_version", &P::adopted_version, "version that it became; null: it was not adopted")
-          .integers("fitted_on", &P::fitted_on, "missions used to fit it, and excluded from its back-test")
-          .json("model", &P::model_json, "the proposed model, as a robot file", of_type("object"))
-          .json("detail", &P::detail_json, "the parameters that it changes, and its back_test",
-                of_type("object"));
-  const auto proposal = [](const A& a) -> const P& { return a.proposal; };
   static const auto table =
       Table<A>()
-          .include(head, proposal)
+          .value("id", AT(proposal.id), "number of the proposal")
+          .value("robot_id", AT(proposal.robot_id), "robot with the model to change")
+          .time("created", AT(proposal.created_utime_us),
+                "time of creation, microseconds since 1970 by the host's clock")
+          .value("kind", AT(proposal.kind), "calibration: refined by the robot's own missions")
           .word(
               "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); },
               history::names_of<history::ProposalState>,
@@ -309,7 +295,15 @@ const described::Table<ProposalAnswer>& proposal_table() {
           .value(
               "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal, a.dismissed); },
               "why it is not offered: closed, or made for another version; null for one that is offered")
-          .include(content, proposal);
+          .value("note", AT(proposal.note), "summary of the change, in a sentence")
+          .value("base_version", AT(proposal.base_version), "version of the model that it changes")
+          .value("adopted_version", AT(proposal.adopted_version),
+                 "version that it became; null: it was not adopted")
+          .integers("fitted_on", AT(proposal.fitted_on),
+                    "missions used to fit it, and excluded from its back-test")
+          .json("model", AT(proposal.model_json), "the proposed model, as a robot file", of_type("object"))
+          .json("detail", AT(proposal.detail_json), "the parameters that it changes, and its back_test",
+                of_type("object"));
   return table;
 }
 
@@ -332,18 +326,13 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   TRY_ASSIGN(const auto cursor, id_cursor(request));
   const std::int64_t limit = request.query_integer("limit").value_or(50);
   TRY_ASSIGN(const auto found, services.store.proposals(id, cursor.value_or(history::whole_future), limit));
-  const auto id_of = [](const history::Proposal& p) { return p.id; };
+  const std::string next = next_id_cursor(found, limit, &history::Proposal::id);
   const auto dismissed = dismissals(services, found);
-  if (request.csv)
-    return proposals_csv(services, request, found, dismissed, next_id_cursor(found, limit, id_of));
-  JsonWriter out;
-  out.begin_object().field("robot_id", id).key("proposals").begin_array();
-  for (const history::Proposal& proposal : found)
+  if (request.csv) return proposals_csv(services, request, found, dismissed, next);
+  const auto write = [&](JsonWriter& out, const history::Proposal& proposal) {
     proposal_table().write(out, {services, proposal, dismissed});
-  out.end_array();
-  write_id_cursor(out, found, limit, id_of);
-  out.end_object();
-  return http::json_response(out.take());
+  };
+  return page_response("proposals", found, write, next, [&](JsonWriter& out) { out.field("robot_id", id); });
 }
 
 Result<Response> proposals(const Services& services, const Request& request) {

@@ -69,11 +69,10 @@ const described::Table<ProblemRow>& problem_table() {
           .value("field", &Error::field, "field of the request at fault; empty: none")
           .value("message", &Error::message, "the problem in a sentence");
   using R = ProblemRow;
-  static const auto table = Table<R>({}, "problem of a robot without a forecast")
-                                .value("robot_id", &R::robot_id, id_words)
-                                .object(
-                                    "problem", [](const R& r) -> const Error& { return r.error; },
-                                    "the reason why this robot has no forecast", error);
+  static const auto table =
+      Table<R>({}, "problem of a robot without a forecast")
+          .value("robot_id", &R::robot_id, id_words)
+          .object("problem", AT(error), "the reason why this robot has no forecast", error);
   return table;
 }
 
@@ -255,9 +254,8 @@ std::optional<Response> brief_profile(const Services& services, Request& r) {
 }
 
 Result<Response> profile(const Services& services, const Request& r) {
-  const ReadProfile read = read_profile(services, r);
-  if (!read) return tl::unexpected(read.error());
-  const auto& [model, input] = **read;
+  TRY_ASSIGN(const auto read, read_profile(services, r));
+  const auto& [model, input] = *read;
   TRY_ASSIGN(const auto output, answers::profile(input, *model, r.stop));
   return http::json_response(answers::profile_json(input, output, *model));
 }

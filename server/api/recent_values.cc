@@ -62,18 +62,13 @@ Result<Response> recent(const Services& services, const Request& request) {
   std::set<std::string> ids(chosen.begin(), chosen.end());
   if (ids.empty())
     for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  const std::int64_t limit = request.query_integer("limit").value_or(max_recent_robots);
-  auto next = ids.upper_bound(std::string(request.query_value("cursor").value_or("")));
-  std::string last;
-  JsonWriter json;
-  json.begin_object().field("window_s", static_cast<double>(ingest::recent_window_us) / 1e6);
-  json.key("robots").begin_array();
-  for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
-    recent_table().write(json, {last = *next, services.recent.of(*next)});
-  json.end_array();
-  write_cursor(json, next == ids.end() ? "" : last);
-  json.end_object();
-  return http::json_response(json.take());
+  const auto [page, next] = page_of_ids(request, ids, max_recent_robots);
+  const auto write = [&](JsonWriter& json, const std::string& id) {
+    recent_table().write(json, {id, services.recent.of(id)});
+  };
+  return page_response("robots", page, write, next, [](JsonWriter& json) {
+    json.field("window_s", static_cast<double>(ingest::recent_window_us) / 1e6);
+  });
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "answers/json/drive_json.h"
-#include "answers/json/ledger_json.h"
+#include "answers/json/mission_json.h"
 
 namespace joulecast::api {
 namespace {
@@ -50,11 +50,8 @@ const Table<ContradictionEvent>& contradiction_event_table() {
   using E = ContradictionEvent;
   static const auto table =
       Table<E>("Contradiction in the telemetry of a robot")
-          .value(
-              "robot_id", [](const E& e) -> const auto& { return e.robot_id; }, "robot of the event")
-          .object(
-              "contradiction", [](const E& e) -> const auto& { return e.contradiction; },
-              "as in the robot's state", contradiction_table());
+          .value("robot_id", AT(robot_id), "robot of the event")
+          .object("contradiction", AT(contradiction), "as in the robot's state", contradiction_table());
   return table;
 }
 
@@ -76,11 +73,10 @@ const Table<ingest::ChargeView>& charge_table() {
           .word(
               "source", [](const V& v) { return battery::name(v.estimate.source); }, sources,
               "present source of the charge estimate; model: modelled power replaces the measured current")
+          .value("default_curve", AT(estimate.default_curve),
+                 "true: the robot file has no open-circuit voltage, and a typical curve is used")
           .value(
-              "default_curve", [](const V& v) { return v.estimate.default_curve; },
-              "true: the robot file has no open-circuit voltage, and a typical curve is used")
-          .value(
-              "flat_curve", [](const V& v) { return v.estimate.flat_curve; },
+              "flat_curve", AT(estimate.flat_curve),
               "true: the voltage is nearly independent of the charge here, so that the charge is estimated "
               "from the current only")
           .text_or_null(
@@ -94,107 +90,14 @@ const Table<ingest::ChargeView>& charge_table() {
               },
               "estimated offset of the battery's current sensor; null: nothing was received about the "
               "battery")
+          .number_or_null("current_bias_sd_a", AT(estimate.current_bias_sd_a),
+                          "standard deviation of current_bias_a")
           .number_or_null(
-              "current_bias_sd_a", [](const V& v) { return v.estimate.current_bias_sd_a; },
-              "standard deviation of current_bias_a")
-          .number_or_null(
-              "time_to_charged_s", [](const V& v) { return v.to_full.duration_s; },
+              "time_to_charged_s", AT(to_full.duration_s),
               "time until the end of charging; away from a charger, if charging started now; null: no "
               "charging observed yet")
-          .number_or_null(
-              "time_to_charged_sd_s", [](const V& v) { return v.to_full.sd_s; },
-              "standard deviation of time_to_charged_s");
-  return table;
-}
-
-const Table<ingest::ChargeView>& charging_table() {
-  using V = ingest::ChargeView;
-  static const auto table = Table<V>()
-                                .word(
-                                    "phase", [](const V& v) { return battery::name(v.phase); },
-                                    std::array{"constant_current", "taper", "full"}, "phase of charging")
-                                .time(
-                                    "since", [](const V& v) { return v.stay.start_utime_us; },
-                                    "start of charging, microseconds since 1970 by the robot's clock")
-                                .value(
-                                    "charged_ah", [](const V& v) { return v.stay.charged_ah; },
-                                    "charge put into the battery during this stay")
-                                .value(
-                                    "charged_j", [](const V& v) { return v.stay.charged_j; },
-                                    "energy at the battery's terminals during this stay");
-  return table;
-}
-
-const Table<RobotSnapshot>& open_mission_table() {
-  using S = RobotSnapshot;
-  static const auto table =
-      Table<S>()
-          .value("id", &S::mission_key, "number of the mission, as in /v1/missions/{id}")
-          .value("mission_id", &S::mission_id, "the robot's identifier of the mission")
-          .time("start", &S::mission_start_utime_us, "start, microseconds since 1970 by the robot's clock")
-          .object("energy", &S::accounts, "energies and their terms", answers::accounts_table());
-  return table;
-}
-
-const Table<RobotSnapshot>& motion_table() {
-  using S = RobotSnapshot;
-  static const auto table =
-      Table<S>()
-          .number_or_null("measured_power_w", &S::measured_power_w,
-                          "measured battery power; null: not measured")
-          .number_or_null("modelled_power_w", &S::modelled_power_w,
-                          "modelled battery power; null outside missions and at a charger")
-          .number_or_null("speed_m_s", &S::speed_m_s, "forward speed; negative: backwards")
-          .number_or_null("yaw_rate_rad_s", &S::yaw_rate_rad_s, "rate of turning, positive to the left")
-          .numbers(
-              "pose", [](const S& s) { return s.sample.pose; },
-              "[x_m, y_m, heading_rad] on its map; null: not measured")
-          .number_or_null(
-              "payload_kg", [](const S& s) { return s.sample.payload_kg; },
-              "as declared by the robot; null: not declared")
-          .number_or_null(
-              "battery_voltage_v", [](const S& s) { return s.sample.battery_voltage_v; },
-              "at the terminals; null: not measured")
-          .number_or_null(
-              "battery_current_a", [](const S& s) { return s.sample.battery_current_a; },
-              "positive: discharging; null: not measured")
-          .number_or_null("state_of_charge", &S::state_of_charge, "0 to 1")
-          .number_or_null(
-              "state_of_charge_sd", [](const S& s) { return s.charge.estimate.sd; },
-              "standard deviation of state_of_charge")
-          .object("charge", &S::charge, "estimation of state_of_charge", charge_table())
-          .object(
-              "charging",
-              [](const S& s) { return battery::at_charger(s.charge.phase) ? &s.charge : nullptr; },
-              "null: not at a charger", charging_table());
-  return table;
-}
-
-const Table<RobotSnapshot>& counts_table() {
-  using S = RobotSnapshot;
-  static const auto table =
-      Table<S>()
-          .numbers("winding_temperature_c", &S::winding_temperature_c,
-                   "temperature of the motors' windings, [right, left]: measured, or modelled where the "
-                   "model has their thermal resistance; otherwise null")
-          .object(
-              "mission", [](const S& s) { return s.mission_id.empty() ? nullptr : &s; },
-              "the open mission; null: none", open_mission_table())
-          .value("samples", &S::samples, "samples accepted since the service started")
-          .map("faults", &S::faults,
-               "messages rejected or repaired since the daemon started, by reason. restart, gap and "
-               "outside_mission also occur in normal operation, by restarts and between missions")
-          .map("fault_notes", &S::fault_notes,
-               "details of the last rejected message, by reason, for the reasons that have any: field, value "
-               "and bound; address of the second sender")
-          .list("contradictions", &S::contradictions,
-                "contradictions of the newest telemetry and of the last mission, found by comparing channels "
-                "with each other, the robot file and the service's clock; empty: none",
-                contradiction_table())
-          .map("missions_left_out", &S::missions_left_out,
-               "missions since the service started that were not used for training, by reason. contradicted: "
-               "contradicted telemetry; barely_measured: the battery was measured for less than half of the "
-               "time");
+          .number_or_null("time_to_charged_sd_s", AT(to_full.sd_s),
+                          "standard deviation of time_to_charged_s");
   return table;
 }
 
@@ -207,17 +110,28 @@ const answers::Quantiles& quantiles_of(const LiveState& state, answers::Quantile
 
 const Table<LiveState>& state_table() {
   using L = LiveState;
-  using S = RobotSnapshot;
-  const auto snapshot = [](const L& l) -> const S& { return l.snapshot; };
+  static const auto charging =
+      Table<ingest::ChargeView>()
+          .word(
+              "phase", [](const ingest::ChargeView& v) { return battery::name(v.phase); },
+              std::array{"constant_current", "taper", "full"}, "phase of charging")
+          .time("since", AT(stay.start_utime_us),
+                "start of charging, microseconds since 1970 by the robot's clock")
+          .value("charged_ah", AT(stay.charged_ah), "charge put into the battery during this stay")
+          .value("charged_j", AT(stay.charged_j), "energy at the battery's terminals during this stay");
+  static const auto open_mission =
+      Table<RobotSnapshot>()
+          .value("id", &RobotSnapshot::mission_key, "number of the mission, as in /v1/missions/{id}")
+          .value("mission_id", &RobotSnapshot::mission_id, "the robot's identifier of the mission")
+          .time("start", &RobotSnapshot::mission_start_utime_us,
+                "start, microseconds since 1970 by the robot's clock")
+          .object("energy", &RobotSnapshot::accounts, "energies and their terms", answers::accounts_table());
   static const auto table =
       Table<L>("Live state of a robot")
           .named("robot-state")
-          .value(
-              "robot_id", [](const L& l) -> const std::string& { return l.snapshot.robot_id; },
-              "the robot's id, as in its telemetry and its file")
-          .value(
-              "has_model", [](const L& l) { return l.snapshot.has_model; },
-              "whether it has a model, so that energy can be modelled")
+          .value("robot_id", AT(snapshot.robot_id), "the robot's id, as in its telemetry and its file")
+          .value("has_model", AT(snapshot.has_model),
+                 "whether it has a model, so that energy can be modelled")
           .value(
               "model_version",
               [](const L& l) {
@@ -238,7 +152,30 @@ const Table<LiveState>& state_table() {
               },
               "time of the last message by the robot's clock, microseconds since 1970. The members below are "
               "of this time; they are current only if the robot is live")
-          .include(motion_table(), snapshot)
+          .number_or_null("measured_power_w", AT(snapshot.measured_power_w),
+                          "measured battery power; null: not measured")
+          .number_or_null("modelled_power_w", AT(snapshot.modelled_power_w),
+                          "modelled battery power; null outside missions and at a charger")
+          .number_or_null("speed_m_s", AT(snapshot.speed_m_s), "forward speed; negative: backwards")
+          .number_or_null("yaw_rate_rad_s", AT(snapshot.yaw_rate_rad_s),
+                          "rate of turning, positive to the left")
+          .numbers("pose", AT(snapshot.sample.pose), "[x_m, y_m, heading_rad] on its map; null: not measured")
+          .number_or_null("payload_kg", AT(snapshot.sample.payload_kg),
+                          "as declared by the robot; null: not declared")
+          .number_or_null("battery_voltage_v", AT(snapshot.sample.battery_voltage_v),
+                          "at the terminals; null: not measured")
+          .number_or_null("battery_current_a", AT(snapshot.sample.battery_current_a),
+                          "positive: discharging; null: not measured")
+          .number_or_null("state_of_charge", AT(snapshot.state_of_charge), "0 to 1")
+          .number_or_null("state_of_charge_sd", AT(snapshot.charge.estimate.sd),
+                          "standard deviation of state_of_charge")
+          .object("charge", AT(snapshot.charge), "estimation of state_of_charge", charge_table())
+          .object(
+              "charging",
+              [](const L& l) {
+                return battery::at_charger(l.snapshot.charge.phase) ? &l.snapshot.charge : nullptr;
+              },
+              "null: not at a charger", charging)
           .number_or_null(
               "range_m", [](const L& l) { return quantiles_of(l, &forecast::Reach::range_m)[1]; },
               "remaining range above the reserve with driving as in its recent legs: median of the forecast "
@@ -253,7 +190,27 @@ const Table<LiveState>& state_table() {
               "run_time_quantiles_s",
               [](const L& l) { return quantiles_of(l, &forecast::Reach::run_time_s); },
               "run time at the quantiles 5, 50 and 95 % of the same forecast", answers::quantiles_table())
-          .include(counts_table(), snapshot);
+          .numbers("winding_temperature_c", AT(snapshot.winding_temperature_c),
+                   "temperature of the motors' windings, [right, left]: measured, or modelled where the "
+                   "model has their thermal resistance; otherwise null")
+          .object(
+              "mission", [](const L& l) { return l.snapshot.mission_id.empty() ? nullptr : &l.snapshot; },
+              "the open mission; null: none", open_mission)
+          .value("samples", AT(snapshot.samples), "samples accepted since the service started")
+          .map("faults", AT(snapshot.faults),
+               "messages rejected or repaired since the daemon started, by reason. restart, gap and "
+               "outside_mission also occur in normal operation, by restarts and between missions")
+          .map("fault_notes", AT(snapshot.fault_notes),
+               "details of the last rejected message, by reason, for the reasons that have any: field, value "
+               "and bound; address of the second sender")
+          .list("contradictions", AT(snapshot.contradictions),
+                "contradictions of the newest telemetry and of the last mission, found by comparing channels "
+                "with each other, the robot file and the service's clock; empty: none",
+                contradiction_table())
+          .map("missions_left_out", AT(snapshot.missions_left_out),
+               "missions since the service started that were not used for training, by reason. contradicted: "
+               "contradicted telemetry; barely_measured: the battery was measured for less than half of the "
+               "time");
   return table;
 }
 

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "answers/live.h"
+#include "answers/model.h"
 #include "describe/table.h"
 #include "forecast/outlook.h"
 #include "ingest/fleet_view.h"

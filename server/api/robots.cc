@@ -3,6 +3,7 @@
 #include <chrono>
 #include <optional>
 #include <set>
+#include <span>
 #include <thread>
 #include <utility>
 
@@ -106,23 +107,14 @@ Result<Response> list_robots(const Services& services, const Request& request) {
   std::set<std::string> ids;
   for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  const std::int64_t limit = request.query_integer("limit").value_or(max_listed_robots);
-  auto next = ids.upper_bound(std::string(request.query_value("cursor").value_or("")));
-  std::string last;
+  const auto [page, next] = page_of_ids(request, ids, max_listed_robots);
   if (request.csv) {
     Csv csv = fleet_csv(request);
-    for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
-      add_row(csv, known_state(services, last = *next), services.now_utime_us());
-    return csv.response("robots", request, next == ids.end() ? "" : last);
+    for (const std::string& id : page) add_row(csv, known_state(services, id), services.now_utime_us());
+    return csv.response("robots", request, next);
   }
-  JsonWriter json;
-  json.begin_object().key("robots").begin_array();
-  for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
-    write_robot_state(json, services, last = *next);
-  json.end_array();
-  write_cursor(json, next == ids.end() ? "" : last);
-  json.end_object();
-  return http::json_response(json.take());
+  const auto write = [&](JsonWriter& json, const std::string& id) { write_robot_state(json, services, id); };
+  return page_response("robots", page, write, next);
 }
 
 using history::ModelVersion;
@@ -182,9 +174,8 @@ const Table<Stored>& stored_table() {
       Table<Stored>("Version of a stored robot model")
           .value("robot_id", &Stored::robot_id, id_of_robot_words)
           .value("model_version", &Stored::version, "version that is in force now")
-          .list(
-              "warnings", [](const Stored& s) -> const auto& { return s.findings; },
-              "values of the model that are within all bounds but implausible; empty: none", warning);
+          .list("warnings", AT(findings),
+                "values of the model that are within all bounds but implausible; empty: none", warning);
   return table;
 }
 
@@ -218,24 +209,19 @@ struct RobotCheck {
   robot::Figures figures{signals::unmeasured, signals::unmeasured, signals::unmeasured, signals::unmeasured};
 };
 
-const Table<robot::ReviewFinding>& finding_table() {
-  using F = robot::ReviewFinding;
-  static const auto table =
-      Table<F>()
-          .value("fault", &F::fault, "true: the file is not accepted; false: suspicious only")
-          .value("field", &F::field, "JSON pointer into the file")
-          .value("says", &F::says, "the fault in a sentence");
-  return table;
-}
-
 const Table<RobotCheck>& check_table() {
   using C = RobotCheck;
+  static const auto finding = Table<robot::ReviewFinding>()
+                                  .value("fault", &robot::ReviewFinding::fault,
+                                         "true: the file is not accepted; false: suspicious only")
+                                  .value("field", &robot::ReviewFinding::field, "JSON pointer into the file")
+                                  .value("says", &robot::ReviewFinding::says, "the fault in a sentence");
   const auto figure = [](double robot::Figures::*member) {
     return [member](const C& check) { return check.figures.*member; };
   };
   static const auto table =
       Table<C>("Review of a robot file")
-          .list("findings", &C::findings, "faults first; empty: none", finding_table())
+          .list("findings", &C::findings, "faults first; empty: none", finding)
           .number_or_null("top_speed_m_s", figure(&robot::Figures::top_speed_m_s),
                           "speed that the motors reach on the flat; these and the following are null if the "
                           "file is not accepted")
@@ -264,17 +250,16 @@ Result<Response> check_file(const Services&, const Request& request) {
 
 Result<Response> put(Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  Result<robot::RobotModel> robot = robot::parse_robot(request.body);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
-  if (robot->robot_id != id)
+  TRY_ASSIGN(const robot::RobotModel robot, robot::parse_robot(request.body));
+  if (robot.robot_id != id)
     return invalid("/robot_id",
-                   "is \"" + robot->robot_id + "\", must equal the id in the path, \"" + id + "\"");
+                   "is \"" + robot.robot_id + "\", must equal the id in the path, \"" + id + "\"");
   // The catalogue's bounds are checked before anything is stored.
-  TRY(dynamics::active_effects(*robot));
-  const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
+  TRY(dynamics::active_effects(robot));
+  const std::vector<robot::ReviewFinding> findings = robot::review(robot);
   TRY(robot::plannable(findings));
   RequestChange change(services, request);
-  return change.result(services.adoption.put(*robot, change.answered_by([id, findings](std::int64_t version) {
+  return change.result(services.adoption.put(robot, change.answered_by([id, findings](std::int64_t version) {
     return http::json_response(stored_table().text({id, version, findings}));
   })));
 }
@@ -339,19 +324,12 @@ Result<Response> versions(const Services& services, const Request& request) {
   const auto limit =
       static_cast<std::size_t>(request.query_integer("limit").value_or(history::max_page_size));
   const auto is_next = [&](const history::ModelVersion& v) { return !cursor || v.version < *cursor; };
-  auto next = std::ranges::find_if(found, is_next);
-  const auto end =
-      next + static_cast<std::ptrdiff_t>(std::min(limit, static_cast<std::size_t>(found.end() - next)));
-  JsonWriter json;
-  json.begin_object()
-      .field("robot_id", request.param("id"))
-      .key(request.deprecated ? "versions" : "models")  // the former path's answer is as before
-      .begin_array();
-  for (; next != end; ++next) version_table().write(json, *next);
-  json.end_array();
-  write_cursor(json, end == found.end() ? "" : std::to_string((end - 1)->version));
-  json.end_object();
-  return http::json_response(json.take());
+  const std::span page(std::ranges::find_if(found, is_next), found.end());
+  const auto shown = page.first(std::min(limit, page.size()));
+  // The former path's answer is as before.
+  return page_response(request.deprecated ? "versions" : "models", shown, version_table(),
+                       shown.size() == page.size() ? "" : std::to_string(shown.back().version),
+                       [&](JsonWriter& json) { json.field("robot_id", request.param("id")); });
 }
 
 Result<Response> get_version(const Services& services, const Request& request) {

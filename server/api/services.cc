@@ -10,7 +10,6 @@
 
 #include "answers/json/autonomy_json.h"
 #include "answers/json/estimate_json.h"
-#include "answers/json/ledger_json.h"
 #include "answers/json/matrix_json.h"
 #include "answers/json/mission_json.h"
 #include "answers/json/profile_json.h"

@@ -9,12 +9,14 @@
 #include <set>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
 #include "history/leases.h"
+#include "ingest/snapshot_bytes.h"
+#include "robot/robot_file.h"
 #include "server/cluster/assignment.h"
-#include "server/cluster/exchange.h"
 
 namespace joulecast::server {
 namespace {
@@ -31,6 +33,7 @@ constexpr std::int64_t own_heard_us = 10'000'000;  // the same of one that is ke
 constexpr milliseconds settling_patience{2000};
 constexpr milliseconds job_period{2000};
 constexpr std::chrono::minutes longest_release{2};  // a writer that takes no data for so long has lost it
+constexpr std::uint64_t turns_between_learning = 4;
 
 double seconds_since(const std::optional<Clock::time_point>& then) {
   if (!then) return std::numeric_limits<double>::quiet_NaN();
@@ -38,6 +41,119 @@ double seconds_since(const std::optional<Clock::time_point>& then) {
 }
 
 }  // namespace
+
+// Data that the daemons of a cluster exchange through the database: the live state of the robots that each
+// keeps, models that were put in force, and learned forecasts. After a turn, this daemon answers for the
+// others' robots as of then, and keeps to the missions that they were requested to begin and end.
+class Exchange {
+ public:
+  Exchange(std::string node, std::unique_ptr<history::SharedState> shared, const Cluster::Parts& parts)
+      : node_(std::move(node)), shared_(std::move(shared)), parts_(parts) {}
+
+  // Call several times a second; one thread.
+  Result<void> turn() {
+    TRY(publish());
+    TRY(hear());
+    TRY(follow_models());
+    TRY(follow_requests());
+    return turns_++ % turns_between_learning == 0 ? follow_learning() : Result<void>();
+  }
+
+ private:
+  Result<void> publish() {
+    std::vector<history::LiveState> news;
+    std::map<std::string, std::shared_ptr<const ingest::RobotSnapshot>> now;
+    for (const auto& [robot_id, epoch] : parts_.keeping.kept()) {
+      auto snapshot = parts_.fleet.find(robot_id);
+      if (snapshot == nullptr) continue;
+      const auto published = published_.find(robot_id);
+      if (published == published_.end() || published->second != snapshot)
+        news.push_back({robot_id, node_, epoch, ingest::snapshot_bytes(*snapshot)});
+      now.emplace(robot_id, std::move(snapshot));
+    }
+    Result<void> put = shared_->put(news);
+    if (put) published_ = std::move(now);
+    return put;
+  }
+
+  Result<void> hear() {
+    TRY_ASSIGN(const auto news, shared_->news(node_));
+    for (const history::LiveState& state : news) {
+      if (parts_.keeping.epoch_of(state.robot_id) != 0) continue;
+      auto snapshot = ingest::snapshot_from_bytes(state.body);
+      // Not in an earlier or later version's layout; under its own name.
+      if (snapshot == nullptr || snapshot->robot_id != state.robot_id) continue;
+      if (const std::int64_t now = parts_.now_utime_us(); snapshot->received_utime_us > now) {
+        auto received = std::make_shared<ingest::RobotSnapshot>(*snapshot);
+        received->received_utime_us = now;  // the keeper's clock is ahead of this host's
+        snapshot = std::move(received);
+      }
+      parts_.fleet.publish(std::move(snapshot));
+    }
+    return {};
+  }
+
+  Result<void> put_in_force(const std::string& robot_id, std::int64_t version) {
+    TRY_ASSIGN(const auto stored, parts_.store.model(robot_id, version));
+    TRY_ASSIGN(robot::RobotModel robot, robot::parse_robot(stored.model_json));
+    return parts_.models.put(std::move(robot), version);
+  }
+
+  // A request to this daemon puts its model into the store and then in force. A model that was in force
+  // before the store was read and differs from the stored one was therefore changed by another daemon.
+  Result<void> follow_models() {
+    const auto version_of = [this](const std::string& robot_id) {
+      const auto model = parts_.models.find(robot_id);
+      return model != nullptr ? std::optional(model->version) : std::nullopt;
+    };
+    std::map<std::string, std::optional<std::int64_t>> before;
+    for (const auto& model : parts_.models.all()) before.emplace(model->robot.robot_id, model->version);
+    TRY_ASSIGN(auto stored, shared_->active_models());
+    for (const auto& [robot_id, version] : before) stored.try_emplace(robot_id);  // removed with all of it
+    for (const auto& [robot_id, version] : stored) {
+      const std::optional<std::int64_t> own = before[robot_id];
+      if (own == version || version_of(robot_id) != own) continue;
+      if (version) {
+        TRY(put_in_force(robot_id, *version));
+      } else {
+        parts_.models.remove(robot_id);
+        parts_.fleet.remove(robot_id);
+      }
+    }
+    return {};
+  }
+
+  Result<void> follow_learning() {
+    TRY_ASSIGN(auto read, shared_->learned(std::string(ingest::Forecasts::topic)));
+    for (const auto& [robot_id, utime_us] : read) {
+      const auto known = learned_.find(robot_id);
+      if (known != learned_.end() && known->second != utime_us && parts_.keeping.epoch_of(robot_id) == 0)
+        parts_.forecasts.learnt_elsewhere(robot_id);
+    }
+    learned_ = std::move(read);
+    return {};
+  }
+
+  // A robot that is taken up later is given its requests by the pipeline, which ignores repeated ones.
+  Result<void> follow_requests() {
+    TRY_ASSIGN(const auto read, shared_->learned(std::string(ingest::mission_request_topic)));
+    for (const auto& [robot_id, utime_us] : read) {
+      std::int64_t& passed = requested_[robot_id];
+      if (passed == utime_us || parts_.keeping.epoch_of(robot_id) == 0) continue;
+      TRY_ASSIGN(const auto requests, ingest::stored_mission_requests(parts_.store, robot_id));
+      for (const ingest::MissionRequest& request : requests) parts_.request_mission(robot_id, request);
+      passed = utime_us;
+    }
+    return {};
+  }
+
+  const std::string node_;
+  const std::unique_ptr<history::SharedState> shared_;
+  const Cluster::Parts& parts_;
+  std::map<std::string, std::shared_ptr<const ingest::RobotSnapshot>> published_;
+  std::map<std::string, std::int64_t> learned_, requested_;
+  std::uint64_t turns_ = 0;
+};
 
 class Cluster::Impl {
  public:
@@ -247,10 +363,9 @@ class Cluster::Impl {
       const bool cut_off = !member.connected && steady > gone_patience &&
                            Clock::now() - gone.at(member.incarnation) > gone_patience;
       if (!expired && !cut_off) continue;
-      const Result<bool> buried = leases_->bury(member);
-      if (!buried) return buried;
-      any |= *buried;
-      if (*buried)
+      TRY_ASSIGN(const bool buried, leases_->bury(member));
+      any |= buried;
+      if (buried)
         parts_.note("daemon " + member.node + " of the cluster is gone: " +
                     (cut_off ? "its connection has ended" : "it does not renew its leases"));
     }
@@ -312,8 +427,7 @@ class Cluster::Impl {
   void exchange() {
     Exchange exchange(options_.node,
                       std::make_unique<history::SharedState>(options_.url, options_.writer + "-exchange"),
-                      parts_.store, parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts,
-                      parts_.now_utime_us, parts_.request_mission);
+                      parts_);
     bool reported = false;
     do {
       survive("cluster exchange", [&] {

@@ -43,8 +43,7 @@ struct ClusterStatus {
 };
 
 // This daemon's part in a cluster: two threads with a connection each. One renews the membership and decides
-// which robots this daemon keeps (assignment.h), several times a second; the other exchanges live state
-// (exchange.h).
+// which robots this daemon keeps (assignment.h), several times a second; the other exchanges live state.
 class Cluster {
  public:
   // Objects that the threads use; all are safe to use from any thread.

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "base/error.h"
@@ -89,8 +93,33 @@ class DiagnosisService {
   DiagnosisCounts counts() const;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  struct Job;
+  // Whether the robot has a mission that a diagnosis could read.
+  Result<void> any_ended(const DiagnosisRequest& request) const;
+  void work();
+  void run(Job& job);
+  Result<void> judge(Job& job);
+  void end_record(history::DiagnosisRecord& record, history::DiagnosisState state, std::string error) const;
+  void finish(Job& job, history::DiagnosisState state, std::string error, std::string report);
+  void settle(Job& job);
+
+  const history::Store& store_;
+  history::Writer& writer_;
+  const ingest::ModelRegistry& models_;
+  const DriftView& drift_;
+  std::function<std::int64_t()> now_utime_us_;
+  DiagnosisOptions options_;
+  std::function<void(const Error&)> on_error_;
+  Ended on_ended_;
+  std::string report_;     // of the job that runs, as HTML
+  std::mutex submitting_;  // between looking at the queue and entering it
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<std::shared_ptr<Job>> waiting_;
+  std::shared_ptr<Job> running_;
+  DiagnosisCounts counts_;
+  bool stopping_ = false;
+  std::thread thread_;
 };
 
 }  // namespace joulecast::server

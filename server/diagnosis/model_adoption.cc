@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "answers/json/back_test_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 #include "energy/back_test.h"
 #include "robot/robot_file.h"
@@ -100,11 +100,10 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
                                  const std::function<bool()>& go_on, Adoption& adoption) {
   const std::unique_lock lock(testing_, std::try_to_lock);
   if (!lock) return fail(Fault::unavailable, "", "another model is being tested; try again in some seconds");
-  const Result<StoredRecordings> history = this->history(request, before, adoption.since_utime_us);
-  if (!history) return tl::unexpected(history.error());
-  adoption.left_out = history->left_out;
+  TRY_ASSIGN(const StoredRecordings history, this->history(request, before, adoption.since_utime_us));
+  adoption.left_out = history.left_out;
   std::vector<energy::DriveRun> runs;
-  for (const StoredRecording& mission : history->missions) {
+  for (const StoredRecording& mission : history.missions) {
     const double payload_kg = mission.recording.payload_kg;
     // The key names the run: mission ids may repeat.
     runs.push_back(
@@ -120,7 +119,7 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   for (energy::RunComparison& run : adoption.test.runs) {
     const history::MissionKey key = std::stoll(run.name);
     run.id = key;
-    for (const StoredRecording& mission : history->missions)
+    for (const StoredRecording& mission : history.missions)
       if (mission.key == key) run.name = mission.recording.mission_id;
   }
   return {};
@@ -218,10 +217,9 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
 
 Result<std::int64_t> ModelAdoption::put(history::Change change, const robot::RobotModel& model) {
   const std::lock_guard lock(putting_);
-  const history::Outcome version = writer_.execute(std::move(change));
-  if (!version) return tl::unexpected(version.error());
-  TRY(models_.put(model, *version));
-  return *version;
+  TRY_ASSIGN(const std::int64_t version, writer_.execute(std::move(change)));
+  TRY(models_.put(model, version));
+  return version;
 }
 
 Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model, history::Change closing) {
@@ -254,8 +252,7 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
   change.add_before([event = history::Event{0, now_utime_us_(), robot_id, "model_activated",
                                             detail.dump(-1, ' ', false, Json::error_handler_t::replace)}](
                         std::int64_t) { return std::vector<history::Command>{history::AppendEvent{event}}; });
-  if (const history::Outcome done = writer_.execute(std::move(change)); !done)
-    return tl::unexpected(done.error());
+  TRY(writer_.execute(std::move(change)));
   TRY(models_.put(std::move(robot), version));
   return previous;
 }
@@ -267,9 +264,8 @@ Result<DiagnosedModel> diagnosed_model(const history::Store& store, const histor
   const auto result = nlohmann::json::parse(diagnosis.result_json, nullptr, false);
   TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(result));
   TRY_ASSIGN(const history::ModelVersion version, store.model(diagnosis.robot_id, diagnosis.model_version));
-  const Result<robot::RobotModel> robot = robot::parse_robot(version.model_json);
-  if (!robot) return tl::unexpected(robot.error());
-  Result<robot::RobotModel> model = gap::take(offer, *robot, choice);
+  TRY_ASSIGN(const robot::RobotModel robot, robot::parse_robot(version.model_json));
+  Result<robot::RobotModel> model = gap::take(offer, robot, choice);
   if (!model) return tl::unexpected(as_of_request(std::move(model.error()), offer));
   return DiagnosedModel{std::move(*model), offer.choice_settles ? "" : offer.refusal};
 }

@@ -132,11 +132,10 @@ Result<bool> ProposalReview::review(history::Proposal candidate) {
   }
   detail["back_test"] = Json::parse(tested.back_test_json);
   candidate.detail_json = detail.dump();
-  const history::Outcome id = writer_.execute(history::AddProposal{std::move(candidate)});
-  if (!id) return tl::unexpected(id.error());
+  TRY_ASSIGN(const std::int64_t id, writer_.execute(history::AddProposal{std::move(candidate)}));
   if (!options_.automatic) return true;
   request.dry_run = false;
-  request.proposal_id = *id;
+  request.proposal_id = id;
   return adoption_.adopt(request).map([](const Adoption&) { return true; });
 }
 
@@ -164,9 +163,7 @@ Result<void> ProposalReview::review_open(const std::string& robot_id) {
 }
 
 Result<void> ProposalReview::dismiss(const history::Proposal& proposal, const std::string& reason) {
-  const history::Outcome closed =
-      writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}});
-  if (!closed) return tl::unexpected(closed.error());
+  TRY(writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}}));
   const Json detail{{"proposal_id", proposal.id}, {"reason", reason}};
   return writer_.offer(history::AppendEvent{{0, now_utime_us_(), proposal.robot_id, "proposal_dismissed",
                                              detail.dump(-1, ' ', false, Json::error_handler_t::replace)}});

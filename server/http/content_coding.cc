@@ -6,7 +6,7 @@
 #include <array>
 #include <utility>
 
-#include "server/http/header_list.h"
+#include "server/http/text.h"
 
 namespace joulecast::http {
 namespace {

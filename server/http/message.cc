@@ -64,6 +64,10 @@ std::string_view Response::header(std::string_view name) const {
   return value != nullptr ? std::string_view(*value) : std::string_view();
 }
 
+std::string_view body_of(const Response& response) {
+  return response.shared_body ? std::string_view(*response.shared_body) : std::string_view(response.body);
+}
+
 Response json_response(std::string body) {
   Response response;
   response.body = std::move(body);

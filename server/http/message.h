@@ -111,6 +111,8 @@ struct Response {
   std::string_view header(std::string_view name) const;  // as Request's
 };
 
+std::string_view body_of(const Response& response);
+
 // A JSON answer with status 200 from text already serialised.
 Response json_response(std::string body);
 

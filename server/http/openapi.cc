@@ -9,10 +9,10 @@
 
 #include "base/json_text.h"
 #include "base/try.h"
-#include "server/http/asset.h"
+#include "server/http/delivery.h"
 #include "server/http/gate.h"
-#include "server/http/idempotency.h"
 #include "server/http/problem.h"
+#include "server/http/router.h"
 #include "server/http/text.h"
 #include "server/http/uri.h"
 

@@ -32,6 +32,13 @@ std::size_t bytes_of(const bhttp::fields& fields) {
   return bytes;
 }
 
+// Control characters would let a value forge further headers.
+void append_header(std::string& head, std::string_view name, std::string_view value) {
+  head.append(name).append(": ");
+  for (const char c : value) head.push_back(static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? ' ' : c);
+  head.append("\r\n");
+}
+
 bool is_sane_id(std::string_view id) {
   return !id.empty() && id.size() <= 64 && std::ranges::all_of(id, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
@@ -40,6 +47,25 @@ bool is_sane_id(std::string_view id) {
 }
 
 }  // namespace
+
+void write_head(std::string& head, const Response& response, const HeadContext& context) {
+  const unsigned status = response.status;
+  const bool bodyless = status == 204 || status == 304;
+  head.assign("HTTP/1.1 ").append(std::to_string(status)).append(" ").append(reason_phrase(status));
+  head.append("\r\nDate: ").append(context.date).append("\r\n");
+  if (!response.content_type.empty() && !bodyless) append_header(head, "Content-Type", response.content_type);
+  if (context.chunked) {
+    head.append("Transfer-Encoding: chunked\r\n");
+  } else if (!response.stream && !bodyless) {
+    head.append("Content-Length: ").append(std::to_string(body_of(response).size())).append("\r\n");
+  }
+  if (!context.keep_alive || context.http_1_0)
+    head.append(context.keep_alive ? "Connection: keep-alive\r\n" : "Connection: close\r\n");
+  head.append("X-Request-Id: ").append(context.request_id).append("\r\nX-Content-Type-Options: nosniff\r\n");
+  if (response.header("Cache-Control").empty()) head.append("Cache-Control: no-store\r\n");
+  for (const auto& [name, value] : response.headers) append_header(head, name, value);
+  head.append("\r\n");
+}
 
 std::shared_ptr<Peer> Core::peer_of(const net::ip::address& address) {
   net::ip::address limited = address;

@@ -17,7 +17,6 @@
 #include "server/http/admission.h"
 #include "server/http/cors.h"
 #include "server/http/http_server.h"
-#include "server/http/proxies.h"
 #include "server/http/worker_pool.h"
 
 namespace boost::asio::ssl {
@@ -89,6 +88,19 @@ struct Core {
   std::uint64_t next_id = 0;
   bool stopping = false;
 };
+
+// Data in the head of an answer in addition to the answer itself.
+struct HeadContext {
+  std::string_view date;
+  std::string_view request_id;
+  bool chunked = false;
+  bool keep_alive = true;
+  bool http_1_0 = false;  // of the client, to which the answer must announce that the connection stays open
+};
+
+// Writes status line and headers into `head`, in one piece: Beast's field list and serializer take a fifth of
+// the rate of small answers.
+void write_head(std::string& head, const Response& response, const HeadContext& context);
 
 // One connection: a coroutine that reads a request, answers it, and begins again.
 class Session : public std::enable_shared_from_this<Session> {

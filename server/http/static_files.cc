@@ -7,7 +7,7 @@
 #include <sstream>
 #include <utility>
 
-#include "server/http/asset.h"
+#include "server/http/delivery.h"
 
 namespace joulecast::http {
 namespace {

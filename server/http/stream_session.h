@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "server/http/problem.h"
-#include "server/http/response_head.h"
 
 namespace joulecast::http {
 

@@ -4,13 +4,8 @@
 #include <mosquitto.h>
 
 #include <algorithm>
-#include <atomic>
 #include <charconv>
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
-#include <optional>
-#include <thread>
 #include <utility>
 
 #include "base/fault_boundary.h"
@@ -169,146 +164,107 @@ Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string
   return options;
 }
 
-class BrokerLink::Impl {
- public:
-  Impl(BrokerOptions options, std::function<void(const std::string&)> on_change)
-      : options_(std::move(options)), on_change_(std::move(on_change)) {}
-  ~Impl() { stop(); }
-
-  Result<void> start() {
-    mosquitto_lib_init();
-    handle_ = mosquitto_new(options_.client_id.c_str(), true, this);
-    if (handle_ == nullptr) return fail(Fault::internal, "mqtt.url", "no memory for the connection");
-    mosquitto_connect_callback_set(
-        handle_, [](mosquitto*, void* self, int code) { static_cast<Impl*>(self)->on_connect(code); });
-    mosquitto_publish_callback_set(handle_, [](mosquitto*, void* self, int message) {
-      static_cast<Impl*>(self)->on_acknowledged(message);
-    });
-    Result<void> set = done(mosquitto_threaded_set(handle_, true), "mqtt.url");
-    if (set && options_.tls) set = set_tls();
-    if (set && !options_.user.empty())
-      set = done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
-                 "mqtt.user");
-    if (set)
-      set = done(mosquitto_will_set(handle_, options_.last_topic.c_str(),
-                                    static_cast<int>(options_.last_words.size()), options_.last_words.data(),
-                                    1, true),
-                 "mqtt.interface");
-    if (!set) return set;
-    const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
-    if (code == MOSQ_ERR_INVAL) return done(code, "mqtt.url");
-    thread_ = std::thread([this, code] { run(code); });
-    return {};
-  }
-
-  Result<void> set_tls() {
-    if (options_.authorities.empty())
-      return done(mosquitto_int_option(handle_, MOSQ_OPT_TLS_USE_OS_CERTS, 1), "mqtt.authorities");
-    return done(mosquitto_tls_set(handle_, options_.authorities.c_str(), nullptr, nullptr, nullptr, nullptr),
-                "mqtt.authorities");
-  }
-
-  bool is_connected() const { return connected_; }
-
-  Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained) {
-    if (!connected_) return fail(Fault::unavailable, "mqtt.url", "the broker is not connected");
-    int id = 0;
-    const int code = mosquitto_publish(handle_, &id, topic.c_str(), static_cast<int>(message.size()),
-                                       message.data(), quality, retained);
-    if (code == MOSQ_ERR_SUCCESS && quality > 0) {
-      const std::lock_guard lock(mutex_);
-      awaited_ = id;
-    }
-    return done(code, "mqtt.url");
-  }
-
-  void stop() {
-    if (handle_ == nullptr) return;
-    if (thread_.joinable()) {
-      {
-        std::unique_lock lock(mutex_);
-        leave_until_ = std::chrono::steady_clock::now() + farewell;
-        wake_.notify_all();
-        // An acknowledgement that comes later makes the library close the connection without a farewell, and
-        // the broker publish the last words.
-        wake_.wait_until(lock, *leave_until_, [this] { return !connected_ || acknowledged_ == awaited_; });
-      }
-      mosquitto_disconnect(handle_);
-      thread_.join();
-    }
-    mosquitto_destroy(std::exchange(handle_, nullptr));
-    mosquitto_lib_cleanup();
-  }
-
- private:
-  // The library's own thread ends permanently at the first fault of TLS or of its protocol, for example when
-  // the broker is killed.
-  void run(int code) {
-    std::chrono::seconds pause = first_pause;
-    for (;;) {
-      while (code == MOSQ_ERR_SUCCESS && !has_left()) {
-        if (connected_) pause = first_pause;
-        code = mosquitto_loop(handle_, longest_wait_ms, 1);
-      }
-      std::unique_lock lock(mutex_);
-      connected_ = false;
-      wake_.notify_all();
-      if (leave_until_) return;
-      lock.unlock();
-      tell(mosquitto_strerror(code));
-      lock.lock();
-      if (wake_.wait_for(lock, pause, [this] { return leave_until_.has_value(); })) return;
-      lock.unlock();
-      pause = std::min(2 * pause, last_pause);
-      code = mosquitto_reconnect_async(handle_);
-    }
-  }
-
-  bool has_left() {
-    const std::lock_guard lock(mutex_);
-    return leave_until_ && (!connected_ || std::chrono::steady_clock::now() > *leave_until_);
-  }
-
-  void on_connect(int code) {
-    connected_ = code == 0;
-    tell(code == 0 ? "" : mosquitto_connack_string(code));
-  }
-  void on_acknowledged(int message) {
-    const std::lock_guard lock(mutex_);
-    acknowledged_ = message;
-    wake_.notify_all();
-  }
-  void tell(const char* why) {
-    survive("MQTT", [&] { on_change_(why); });
-  }
-
-  const BrokerOptions options_;
-  const std::function<void(const std::string&)> on_change_;
-  mosquitto* handle_ = nullptr;
-  std::atomic<bool> connected_ = false;
-  std::thread thread_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  int awaited_ = 0;       // the last message that requires an acknowledgement
-  int acknowledged_ = 0;  // the last that has one, or requires none and is sent
-  std::optional<std::chrono::steady_clock::time_point> leave_until_;  // set: no connection is made any more
-};
-
-BrokerLink::BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change)
-    : impl_(std::make_unique<Impl>(std::move(options), std::move(on_change))) {}
-BrokerLink::~BrokerLink() = default;
 Result<void> BrokerLink::start() {
-  return impl_->start();
+  mosquitto_lib_init();
+  handle_ = mosquitto_new(options_.client_id.c_str(), true, this);
+  if (handle_ == nullptr) return fail(Fault::internal, "mqtt.url", "no memory for the connection");
+  mosquitto_connect_callback_set(
+      handle_, [](mosquitto*, void* self, int code) { static_cast<BrokerLink*>(self)->on_connect(code); });
+  mosquitto_publish_callback_set(handle_, [](mosquitto*, void* self, int message) {
+    static_cast<BrokerLink*>(self)->on_acknowledged(message);
+  });
+  TRY(done(mosquitto_threaded_set(handle_, true), "mqtt.url"));
+  if (options_.tls) TRY(set_tls());
+  if (!options_.user.empty())
+    TRY(done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
+             "mqtt.user"));
+  TRY(done(
+      mosquitto_will_set(handle_, options_.last_topic.c_str(), static_cast<int>(options_.last_words.size()),
+                         options_.last_words.data(), 1, true),
+      "mqtt.interface"));
+  const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
+  if (code == MOSQ_ERR_INVAL) return done(code, "mqtt.url");
+  thread_ = std::thread([this, code] { run(code); });
+  return {};
 }
-bool BrokerLink::is_connected() const {
-  return impl_->is_connected();
+
+Result<void> BrokerLink::set_tls() {
+  if (options_.authorities.empty())
+    return done(mosquitto_int_option(handle_, MOSQ_OPT_TLS_USE_OS_CERTS, 1), "mqtt.authorities");
+  return done(mosquitto_tls_set(handle_, options_.authorities.c_str(), nullptr, nullptr, nullptr, nullptr),
+              "mqtt.authorities");
 }
+
 Result<void> BrokerLink::publish(const std::string& topic, const std::string& message, int quality,
                                  bool retained) {
-  return impl_->publish(topic, message, quality, retained);
+  if (!connected_) return fail(Fault::unavailable, "mqtt.url", "the broker is not connected");
+  int id = 0;
+  const int code = mosquitto_publish(handle_, &id, topic.c_str(), static_cast<int>(message.size()),
+                                     message.data(), quality, retained);
+  if (code == MOSQ_ERR_SUCCESS && quality > 0) {
+    const std::lock_guard lock(mutex_);
+    awaited_ = id;
+  }
+  return done(code, "mqtt.url");
 }
+
 void BrokerLink::stop() {
-  impl_->stop();
+  if (handle_ == nullptr) return;
+  if (thread_.joinable()) {
+    {
+      std::unique_lock lock(mutex_);
+      leave_until_ = std::chrono::steady_clock::now() + farewell;
+      wake_.notify_all();
+      // An acknowledgement that comes later makes the library close the connection without a farewell, and
+      // the broker publish the last words.
+      wake_.wait_until(lock, *leave_until_, [this] { return !connected_ || acknowledged_ == awaited_; });
+    }
+    mosquitto_disconnect(handle_);
+    thread_.join();
+  }
+  mosquitto_destroy(std::exchange(handle_, nullptr));
+  mosquitto_lib_cleanup();
+}
+
+// The library's own thread ends permanently at the first fault of TLS or of its protocol, for example when
+// the broker is killed.
+void BrokerLink::run(int code) {
+  std::chrono::seconds pause = first_pause;
+  for (;;) {
+    while (code == MOSQ_ERR_SUCCESS && !has_left()) {
+      if (connected_) pause = first_pause;
+      code = mosquitto_loop(handle_, longest_wait_ms, 1);
+    }
+    std::unique_lock lock(mutex_);
+    connected_ = false;
+    wake_.notify_all();
+    if (leave_until_) return;
+    lock.unlock();
+    tell(mosquitto_strerror(code));
+    lock.lock();
+    if (wake_.wait_for(lock, pause, [this] { return leave_until_.has_value(); })) return;
+    lock.unlock();
+    pause = std::min(2 * pause, last_pause);
+    code = mosquitto_reconnect_async(handle_);
+  }
+}
+
+bool BrokerLink::has_left() {
+  const std::lock_guard lock(mutex_);
+  return leave_until_ && (!connected_ || std::chrono::steady_clock::now() > *leave_until_);
+}
+
+void BrokerLink::on_connect(int code) {
+  connected_ = code == 0;
+  tell(code == 0 ? "" : mosquitto_connack_string(code));
+}
+void BrokerLink::on_acknowledged(int message) {
+  const std::lock_guard lock(mutex_);
+  acknowledged_ = message;
+  wake_.notify_all();
+}
+void BrokerLink::tell(const char* why) {
+  survive("MQTT", [&] { on_change_(why); });
 }
 
 }  // namespace joulecast::server

@@ -6,14 +6,17 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "answers/json/battery_dialects.h"
 #include "base/error.h"
+
+struct mosquitto;
 
 namespace joulecast::server {
 
@@ -38,23 +41,39 @@ class BrokerLink {
  public:
   // `on_change(text)` is called with an empty text when the connection is made, and with the reason when it
   // is lost or fails: on a thread of the link's.
-  BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change);
-  ~BrokerLink();
+  BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change)
+      : options_(std::move(options)), on_change_(std::move(on_change)) {}
+  ~BrokerLink() { stop(); }
   BrokerLink(const BrokerLink&) = delete;
   BrokerLink& operator=(const BrokerLink&) = delete;
 
   // Fault::invalid where the broker's name or the certificate authorities are unusable; an unreachable broker
   // is no fault.
   Result<void> start();
-  bool is_connected() const;
+  bool is_connected() const { return connected_; }
   // Fault::unavailable without a connection; the message is not queued.
   Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained);
   // Disconnects from the broker.
   void stop();
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  Result<void> set_tls();
+  void run(int code);
+  bool has_left();
+  void on_connect(int code);
+  void on_acknowledged(int message);
+  void tell(const char* why);
+
+  const BrokerOptions options_;
+  const std::function<void(const std::string&)> on_change_;
+  mosquitto* handle_ = nullptr;
+  std::atomic<bool> connected_ = false;
+  std::thread thread_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  int awaited_ = 0;       // the last message that requires an acknowledgement
+  int acknowledged_ = 0;  // the last that has one, or requires none and is sent
+  std::optional<std::chrono::steady_clock::time_point> leave_until_;  // set: no connection is made any more
 };
 
 // The batteries of live robots on an MQTT broker, in the format of VDA 5050:

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/text_file.h"
+#include "base/try.h"
 
 namespace joulecast::access {
 namespace {
@@ -22,12 +23,11 @@ Result<std::string> read_secret(const std::string& path, std::size_t least) {
   if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
   if ((status.st_mode & S_IROTH) != 0)
     return invalid(path, "may be read by every user of this machine: chmod o-r");
-  Result<std::string> text = read_text_file(path, most_secret_bytes);
-  if (!text) return text;
+  TRY_ASSIGN(std::string text, read_text_file(path, most_secret_bytes));
   constexpr const char* space = " \t\r\n";
-  text->erase(0, text->find_first_not_of(space));
-  text->erase(text->find_last_not_of(space) + 1);
-  if (text->size() < least) return invalid(path, "must hold " + std::to_string(least) + " bytes at least");
+  text.erase(0, text.find_first_not_of(space));
+  text.erase(text.find_last_not_of(space) + 1);
+  if (text.size() < least) return invalid(path, "must hold " + std::to_string(least) + " bytes at least");
   return text;
 }
 

@@ -78,11 +78,10 @@ Result<std::vector<Token>> parse_tokens(std::string_view json_text) {
   std::vector<Token> tokens;
   for (const Json& each : list) {
     const std::string at = "/tokens/" + std::to_string(tokens.size());
-    Result<Token> token = read_token(each, at);
-    if (!token) return tl::unexpected(std::move(token.error()));
-    if (std::ranges::find(tokens, token->name, &Token::name) != tokens.end())
-      return invalid(at + "/name", "is " + token->name + ", which another token has");
-    tokens.push_back(std::move(*token));
+    TRY_ASSIGN(Token token, read_token(each, at));
+    if (std::ranges::find(tokens, token.name, &Token::name) != tokens.end())
+      return invalid(at + "/name", "is " + token.name + ", which another token has");
+    tokens.push_back(std::move(token));
   }
   return tokens;
 }

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "answers/drive.h"
-#include "answers/live.h"
 #include "answers/model.h"
 #include "forecast/limitation.h"
 #include "forecast/outlook.h"

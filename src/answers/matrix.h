@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "answers/drive.h"
-#include "answers/live.h"
 #include "answers/model.h"
 #include "planning/cost_matrix.h"
 #include "planning/cost_table_cache.h"

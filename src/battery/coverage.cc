@@ -105,18 +105,15 @@ Result<void> try_temperatures(const robot::Battery& battery, Coverage& seen) {
     const auto share = [&](std::optional<double> activation_k) -> Result<double> {
       robot::Battery changed = battery;
       if (activation_k) changed.activation_k = *activation_k;
-      const auto there = lasts(changed, unseen.rate_1_h, temperature_c);
-      if (!there) return there;
-      const auto here = lasts(changed, unseen.rate_1_h, middle_c);
-      if (!here) return here;
-      return *there / *here;
+      TRY_ASSIGN(const double there, lasts(changed, unseen.rate_1_h, temperature_c));
+      TRY_ASSIGN(const double here, lasts(changed, unseen.rate_1_h, middle_c));
+      return there / here;
     };
-    const auto own = share({}), mild = share(least_activation_k), strong = share(most_activation_k);
-    for (const auto* each : {&own, &mild, &strong})
-      if (!*each) return tl::unexpected(each->error());
-    unseen.by_this = *own;
-    unseen.least = std::min(*mild, *strong);
-    unseen.most = std::max(*mild, *strong);
+    TRY_ASSIGN(unseen.by_this, share({}));
+    TRY_ASSIGN(const double mild, share(least_activation_k));
+    TRY_ASSIGN(const double strong, share(most_activation_k));
+    unseen.least = std::min(mild, strong);
+    unseen.most = std::max(mild, strong);
     seen.unseen_temperatures.push_back(unseen);
   }
   return {};

@@ -59,10 +59,9 @@ Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
   std::vector<double> power(recording.size());
   for (std::size_t row = 0; row < recording.size(); ++row)
     power[row] = recording.current_a[row] * recording.voltage_v[row];
-  auto load = held_load(kind, recording.time_s, power);
-  if (!load) return load;
+  TRY_ASSIGN(auto load, held_load(kind, recording.time_s, power));
   for (std::size_t row = 1; row < recording.size(); ++row)
-    if (same_current(recording, row)) load->pieces[row - 1].begin = power[row - 1];
+    if (same_current(recording, row)) load.pieces[row - 1].begin = power[row - 1];
   return load;
 }
 

@@ -219,26 +219,24 @@ bool stands_for_itself(const std::string& file) {
 
 Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix) {
   if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};
-  auto found = files_of(file_or_prefix);
-  if (!found) return found;
-  std::erase_if(*found, [](const fs::path& file) { return ends_with(file, random_ending); });
-  if (std::ranges::any_of(*found, [](const fs::path& file) { return ends_with(file, test_ending); }))
-    std::erase_if(*found, [](const fs::path& file) { return !ends_with(file, test_ending); });
-  if (found->empty())
+  TRY_ASSIGN(auto found, files_of(file_or_prefix));
+  std::erase_if(found, [](const fs::path& file) { return ends_with(file, random_ending); });
+  if (std::ranges::any_of(found, [](const fs::path& file) { return ends_with(file, test_ending); }))
+    std::erase_if(found, [](const fs::path& file) { return !ends_with(file, test_ending); });
+  if (found.empty())
     return fail(Fault::not_found, file_or_prefix,
                 "stands for no tests: only for random discharges, *_rw.csv");
-  return of_one_battery(file_or_prefix, std::move(*found));
+  return of_one_battery(file_or_prefix, std::move(found));
 }
 
 Result<std::vector<std::filesystem::path>> discharge_files(const std::string& file_or_prefix) {
   if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};
-  auto found = files_of(file_or_prefix);
-  if (!found) return found;
-  std::erase_if(*found, [](const fs::path& file) { return !ends_with(file, random_ending); });
-  if (found->empty())
+  TRY_ASSIGN(auto found, files_of(file_or_prefix));
+  std::erase_if(found, [](const fs::path& file) { return !ends_with(file, random_ending); });
+  if (found.empty())
     return fail(Fault::not_found, file_or_prefix,
                 "stands for no random discharges, *_rw.csv: name the files");
-  return of_one_battery(file_or_prefix, std::move(*found));
+  return of_one_battery(file_or_prefix, std::move(found));
 }
 
 }  // namespace joulecast::battery

@@ -35,20 +35,6 @@ Schema of_bounds(const Bounds& bounds);
 // {"minItems", "maxItems"}
 Schema of_count(const Count& count);
 
-// The member of a member: within(&Drive::problem, &Problem::deadline_s).
-template <class Outer, class... Inner>
-auto within(Outer outer, Inner... inner) {
-  if constexpr (sizeof...(inner) == 0) {
-    return [outer](auto& object) -> auto& {
-      return std::invoke(outer, object);
-    };
-  } else {
-    return [ outer, next = within(inner...) ](auto& object) -> auto& {
-      return next(std::invoke(outer, object));
-    };
-  }
-}
-
 // Calls with the context of a table. One without a context is part of any other.
 template <class Context, class Given, class Call>
 auto in_context(Given& given, Call call) {

@@ -470,8 +470,7 @@ Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s) {
   for (std::size_t k = 0; k < run.samples.size(); ++k) {
     signals::Sample sample = run.samples[k];
     sample.payload_kg = payload.take(sample.payload_kg);
-    Result<void> added = meter.add(sample, run.climb_at(k), steps[k] == signals::Step::bridged);
-    if (!added) return added;
+    TRY(meter.add(sample, run.climb_at(k), steps[k] == signals::Step::bridged));
   }
   return meter.flush();
 }

@@ -122,11 +122,10 @@ Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_
 }
 
 Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenMode mode, bool or_older) {
-  auto database = connect_file(path, mode);
-  if (!database) return database;
+  TRY_ASSIGN(auto database, connect_file(path, mode));
   TRY_ASSIGN(
       const auto version,
-      guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path));
+      guarded([&]() -> Result<std::int64_t> { return database->integer("PRAGMA user_version"); }, path));
   if (or_older && version < store_schema().version) return database;
   TRY(check_version(path, version, store_schema()));
   return database;
@@ -136,11 +135,10 @@ Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
   TRY(check_store_url(url));
   if (!is_postgres_url(url)) return open_file(sqlite_path(url));
   TRY_ASSIGN(auto database, connect_server(url));
-  const auto version = guarded([&]() -> Result<std::int64_t> {
-    return database->integer("SELECT schema_version FROM joulecast_store");
-  });
-  if (!version) return tl::unexpected(version.error());
-  TRY(check_version("url", *version, postgres_schema()));
+  TRY_ASSIGN(const auto version, guarded([&]() -> Result<std::int64_t> {
+               return database->integer("SELECT schema_version FROM joulecast_store");
+             }));
+  TRY(check_version("url", version, postgres_schema()));
   return std::unique_ptr<Database>(std::move(database));
 }
 

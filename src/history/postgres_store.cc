@@ -61,10 +61,9 @@ Result<std::unique_ptr<PostgresDatabase>> connect_writer(const PostgresOptions& 
 
 Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& options,
                                                       const std::string& writer_name) {
-  auto database = connect_writer(options, writer_name);
-  if (!database) return database;
-  TRY(wait_for_lock(**database, try_lock, options.lock_wait));
-  TRY(bring_to_postgres_schema(**database));
+  TRY_ASSIGN(auto database, connect_writer(options, writer_name));
+  TRY(wait_for_lock(*database, try_lock, options.lock_wait));
+  TRY(bring_to_postgres_schema(*database));
   return database;
 }
 

@@ -206,9 +206,8 @@ Result<StoreCheck> back_up_store(const std::string& path, const std::string& cop
   TRY_ASSIGN(auto file, new_file(copy));
   TRY_ASSIGN(auto database, open_file(path, OpenMode::read_write_create));
   TRY(copy_into(*database, file.written_to()));
-  auto check = check_store(file.written_to());
-  if (!check) return check;
-  if (!check->faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
+  TRY_ASSIGN(auto check, check_store(file.written_to()));
+  if (!check.faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check.faults.front());
   TRY(file.commit());
   return check;
 }

@@ -38,8 +38,8 @@ class IngestService::Impl {
   ~Impl() { stop(); }
 
   Result<void> start() {
-    if (Result<void> keys = signatures_.read_keys(); !keys) return keys;
-    if (Result<void> recovered = pipeline_.recover(); !recovered) return recovered;
+    TRY(signatures_.read_keys());
+    TRY(pipeline_.recover());
     TRY_ASSIGN(telemetry::LcmLink link, telemetry::LcmLink::open(options_.lcm_url));
     link_ = std::make_unique<telemetry::LcmLink>(std::move(link));
     const auto handler = [this](const telemetry::Received& received) {
@@ -50,8 +50,7 @@ class IngestService::Impl {
         if (message) batch_.push_back(std::move(*message));
       });
     };
-    if (Result<void> done = link_->listen(handler, outputs_.counters.datagrams, options_.listen); !done)
-      return done;
+    TRY(link_->listen(handler, outputs_.counters.datagrams, options_.listen));
     running_ = true;
     receiving_ = true;
     pipeline_.start_reading();

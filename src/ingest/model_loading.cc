@@ -58,8 +58,7 @@ Result<void> load_robot(const robot::RobotModel& robot, const std::string& path,
                                         &history::ModelVersion::origin);  // newest first
     if (last != versions->end() && last->model_json == command.model_json) return {};
   }
-  if (history::Outcome added = writer.execute(std::move(command)); !added)
-    return tl::unexpected(std::move(added.error()));
+  TRY(writer.execute(std::move(command)));
   return {};
 }
 

@@ -3,6 +3,8 @@
 #include <mutex>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::ingest {
 
 Error unknown_robot(std::string field, std::string_view robot_id) {
@@ -10,9 +12,8 @@ Error unknown_robot(std::string field, std::string_view robot_id) {
 }
 
 Result<void> ModelRegistry::put(robot::RobotModel robot, std::int64_t version) {
-  Result<std::shared_ptr<const ModelInForce>> model = model_in_force(std::move(robot), version);
-  if (!model) return tl::unexpected(std::move(model.error()));
-  put_back(*std::move(model));
+  TRY_ASSIGN(std::shared_ptr<const ModelInForce> model, model_in_force(std::move(robot), version));
+  put_back(std::move(model));
   return {};
 }
 

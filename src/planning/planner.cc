@@ -125,7 +125,7 @@ class Request {
     // On rough grids, to see whether the deadline is earlier.
     auto free = roughly(problem_.value_of_time_w);
     if (free && free->duration_s <= deadline * 1.02) {
-      if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
+      TRY(solve(problem_.value_of_time_w));
       if (duration_s() <= deadline) return {};
       least_j_ = cost_j();
     } else if (!free) {
@@ -160,7 +160,7 @@ class Request {
     keeps_until_s_ = deadline;
     kept_.answers.clear();
     if (!answers_.empty()) usual_w_ = std::fabs(energy_j() / duration_s());
-    if (auto ok = search(deadline, early_s); !ok) return ok;
+    TRY(search(deadline, early_s));
     keep();
     if (!kept_.answers.empty()) std::swap(answers_, kept_.answers), price_w_ = kept_.price_w;
     return {};
@@ -199,14 +199,14 @@ class Request {
           return above(c.energy_j, rough.energy_j);
         });
       };
-      if (auto ok = draw_in(at, 0.02, roughly_above); !ok) return ok;
+      TRY(draw_in(at, 0.02, roughly_above));
     }
     const auto truly_above = [&](double x) -> Result<double> {
       TRY(solve(std::exp(-x)));
       return above(energy_j(), least_j);
     };
     const double rest = std::clamp(1e-5 * budget_j / std::max(spare_j, smallest_j), 1e-3, 0.5);
-    if (auto ok = draw_in(at, -std::log1p(-rest), truly_above); !ok) return ok;
+    TRY(draw_in(at, -std::log1p(-rest), truly_above));
     keep();
     if (kept_.answers.empty()) return refused();
     std::swap(answers_, kept_.answers), price_w_ = kept_.price_w;
@@ -222,7 +222,7 @@ class Request {
       // The error that a grid states of itself is less certain the higher the price of time.
       for (const double dear : {0.0, 3.0, 30.0, 300.0}) {
         if (grids && dear > 0) break;
-        if (auto ok = solve(price_w_ + dear * std::max(usual_w_, 1e-3)); !ok) return ok;
+        TRY(solve(price_w_ + dear * std::max(usual_w_, 1e-3)));
         bound_by(deadline);
       }
       return solve(at_once_w);
@@ -253,14 +253,14 @@ class Request {
       // Rough grids do not distinguish the highest prices.
       Search near = at;
       near.most = std::max(at.x, std::log(30 * std::max(usual_w_, 1e-3)));
-      if (auto ok = draw_in(near, 0.02, roughly_late); !ok) return ok;
+      TRY(draw_in(near, 0.02, roughly_late));
       if (near.x < near.most) at.x = near.x, at.slope = near.slope;
     }
     // The unused time may cost a small share of the energy, or of the freedom that the deadline leaves.
     const double little_s =
         std::max({1e-6 * deadline, 1e-3 * (deadline - least_s), 1e-4 * usual_w_ * deadline / price_at(at.x)});
     const double early = -std::log1p(-std::min(0.5, std::min(early_s, little_s) / (deadline - least_s)));
-    if (auto ok = draw_in(at, early, truly_late); !ok) return ok;
+    TRY(draw_in(at, early, truly_late));
     keep();
     // Closer to the shortest time than any finite price comes.
     return kept_.answers.empty() ? solve(at_once_w) : Result<void>{};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "base/try.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 
@@ -29,10 +30,8 @@ Result<void> write_changes(EventLogWriter& log, const std::string& robot_id,
            message.covariates.size() < signals::max_covariates;
          ++k)
       message.covariates.push_back({changes[k].name, changes[k].value});
-    auto written = encode_covariates(robot_id, message).and_then([&](const std::vector<std::uint8_t>& bytes) {
-      return log.write(message.utime_us, channel, bytes);
-    });
-    if (!written) return written;
+    TRY_ASSIGN(const std::vector<std::uint8_t> bytes, encode_covariates(robot_id, message));
+    TRY(log.write(message.utime_us, channel, bytes));
   }
   return {};
 }
@@ -52,26 +51,17 @@ Result<void> write_recording(EventLogWriter& log, const Recording& recording) {
   const std::string channel = channel_of(Subject::telemetry, recording.robot_id);
   const std::vector<signals::CovariateChange> changes = signals::changes_of(recording.covariates);
   std::span<const signals::CovariateChange> left = changes;
-  auto written =
-      write_event(log, recording, signals::MissionPhase::started, recording.samples.front().utime_us);
-  const auto write_up_to = [&](std::int64_t utime_us) {
-    std::size_t count = 0;
-    while (count < left.size() && left[count].utime_us <= utime_us) ++count;
-    if (written) written = write_changes(log, recording.robot_id, left.first(count));
-    left = left.subspan(count);
-  };
+  TRY(write_event(log, recording, signals::MissionPhase::started, recording.samples.front().utime_us));
   for (const signals::Sample& sample : recording.samples) {
-    write_up_to(sample.utime_us);
-    if (!written) return written;
-    written =
-        encode_telemetry(recording.robot_id, sample).and_then([&](const std::vector<std::uint8_t>& bytes) {
-          return log.write(sample.utime_us, channel, bytes);
-        });
-    if (!written) return written;
+    std::size_t count = 0;
+    while (count < left.size() && left[count].utime_us <= sample.utime_us) ++count;
+    TRY(write_changes(log, recording.robot_id, left.first(count)));
+    left = left.subspan(count);
+    TRY_ASSIGN(const auto bytes, encode_telemetry(recording.robot_id, sample));
+    TRY(log.write(sample.utime_us, channel, bytes));
   }
   const std::int64_t end_us = recording.samples.back().utime_us;
-  written = write_event(log, recording, signals::MissionPhase::finished, end_us);
-  if (!written) return written;
+  TRY(write_event(log, recording, signals::MissionPhase::finished, end_us));
   std::vector<signals::CovariateChange> unknown;
   for (const signals::CovariateSeries& series : recording.covariates) {
     if (!series.value.empty() && !std::isnan(series.value.back()))

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "base/try.h"
 #include "telemetry/log_recordings.h"
 
 namespace joulecast::telemetry {
@@ -117,38 +118,37 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
 
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
                                      const LogObserver& passed) {
-  Result<LogRecordings> log = read_recordings(paths, robot_id, passed);
-  if (!log) return tl::unexpected(std::move(log.error()));
-  if (log->robots.empty()) return invalid("log", "holds no telemetry");
-  if (!robot_id.empty() && !log->robots.contains(robot_id))
-    return invalid("log", "holds no telemetry of " + robot_id + ", only of " + listed(log->robots));
-  if (robot_id.empty() && log->robots.size() > 1) {
-    return invalid("log", fmt::format("holds {} robots, {}; name the one to diagnose", log->robots.size(),
-                                      listed(log->robots)));
+  TRY_ASSIGN(LogRecordings log, read_recordings(paths, robot_id, passed));
+  if (log.robots.empty()) return invalid("log", "holds no telemetry");
+  if (!robot_id.empty() && !log.robots.contains(robot_id))
+    return invalid("log", "holds no telemetry of " + robot_id + ", only of " + listed(log.robots));
+  if (robot_id.empty() && log.robots.size() > 1) {
+    return invalid("log", fmt::format("holds {} robots, {}; name the one to diagnose", log.robots.size(),
+                                      listed(log.robots)));
   }
   Result<RecordingSet> set =
-      make_recording_set(robot_id.empty() ? *log->robots.begin() : robot_id, std::move(log->recordings));
+      make_recording_set(robot_id.empty() ? *log.robots.begin() : robot_id, std::move(log.recordings));
   std::string beyond_ranges;
-  for (const auto& [field, beyond] : log->beyond_range) {
+  for (const auto& [field, beyond] : log.beyond_range) {
     beyond_ranges +=
         fmt::format("{}{} samples have an impossible {}, up to {:.4g}{}", beyond_ranges.empty() ? "" : "; ",
                     beyond.samples, field, beyond.farthest, in_other_unit(field, beyond.farthest));
   }
   if (!set) {
     if (!beyond_ranges.empty()) set.error().message += ": " + beyond_ranges;
-    if (log->beyond_range.contains("utime")) set.error().field = "utime";
+    if (log.beyond_range.contains("utime")) set.error().field = "utime";
     return set;
   }
-  set->beyond_range = std::move(log->beyond_range);
-  set->unreadable = log->unreadable;
-  if (log->unreadable > 0)
+  set->beyond_range = std::move(log.beyond_range);
+  set->unreadable = log.unreadable;
+  if (log.unreadable > 0)
     set->notes.push_back(fmt::format(
-        "{} messages or values could not be read, exceed a limit or are duplicates", log->unreadable));
+        "{} messages or values could not be read, exceed a limit or are duplicates", log.unreadable));
   if (!beyond_ranges.empty())
     set->notes.push_back("of these " + beyond_ranges + "; the others may be biased");
-  if (log->samples_outside > 0)
+  if (log.samples_outside > 0)
     set->notes.push_back(fmt::format(
-        "{} samples before a mission's start or just after its end were left out", log->samples_outside));
+        "{} samples before a mission's start or just after its end were left out", log.samples_outside));
   return set;
 }
 

@@ -33,7 +33,7 @@ class CommandLine : public ::testing::Test {
  protected:
   CommandLine() : program_("joulecast", "joulecast") {
     program_.formatter(std::make_shared<HelpFormatter>(width));
-    for (const auto add : commands()) add(program_, exit_);
+    add_commands(program_, exit_);
     program_.require_subcommand(1);
     char folder[] = "/tmp/joulecast-completion-XXXXXX";
     EXPECT_NE(mkdtemp(folder), nullptr);

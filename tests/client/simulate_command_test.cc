@@ -31,7 +31,7 @@ std::optional<Exit> run(std::vector<std::string> words) {
   CLI::App program("joulecast");
   program.require_subcommand(1);
   Exit exit = Exit::ok;
-  for (const auto add : commands()) add(program, exit);
+  add_commands(program, exit);
   std::reverse(words.begin(), words.end());
   try {
     program.parse(words);

@@ -15,7 +15,7 @@ CLI::App& program() {
   static CLI::App app("joulecast", "joulecast");
   static client::Exit exit = client::Exit::ok;
   static const bool ready = [] {
-    for (const auto add : client::commands()) add(app, exit);
+    client::add_commands(app, exit);
     app.require_subcommand(1);
     // Parsed commands are not run.
     app.parse_complete_callback([] { throw CLI::Success(); });

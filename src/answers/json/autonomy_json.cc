@@ -17,7 +17,6 @@ namespace {
 
 using described::Input;
 using described::Presence;
-using described::within;
 
 constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
 constexpr std::size_t max_id_bytes = 200;
@@ -108,20 +107,19 @@ const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
           .include(point_input<planning::Point>("place of the charger on the map"), &Charger::at)
           .number("detour_factor", &Charger::detour_factor, {.minimum = 1, .maximum = 100},
                   "of the way to it over the straight line", 1);
-  constexpr auto in = &AutonomyRequest::input;
   static const auto input =
       Input<AutonomyRequest, AutonomyContext>(
           "Conditions of an autonomy forecast; with an empty object, those of the robot at present")
           .named("autonomy-request")
-          .number("state_of_charge", within(in, &AutonomyInput::state_of_charge), fraction,
+          .number("state_of_charge", AT(input.state_of_charge), fraction,
                   "state of charge; default: the live one")
-          .number("state_of_charge_sd", within(in, &AutonomyInput::state_of_charge_sd),
-                  {.minimum = 0, .maximum = 0.5}, "standard deviation of state_of_charge")
-          .number("reserve_fraction", within(in, &AutonomyInput::reserve_fraction), fraction,
+          .number("state_of_charge_sd", AT(input.state_of_charge_sd), {.minimum = 0, .maximum = 0.5},
+                  "standard deviation of state_of_charge")
+          .number("reserve_fraction", AT(input.reserve_fraction), fraction,
                   "charge to be left at the end; default: that of the robot file")
-          .number("payload_kg", within(in, &AutonomyInput::payload_kg), payload,
+          .number("payload_kg", AT(input.payload_kg), payload,
                   "present payload; default: the live one, else 0")
-          .choice("driving", within(in, &AutonomyInput::driving), driving_names,
+          .choice("driving", AT(input.driving), driving_names,
                   "driving model. usual: at the robot's own pace or the stated one, which predicts how long "
                   "the charge lasts in operation; minimum_energy: along the planner's profiles",
                   static_cast<std::size_t>(Driving::usual))
@@ -133,32 +131,32 @@ const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
               },
               "report what minimum-energy profiles would change; default true for one robot, false for a "
               "fleet")
-          .boolean("compare_fastest", within(in, &AutonomyInput::compare_fastest),
+          .boolean("compare_fastest", AT(input.compare_fastest),
                    "report the fastest minimum-energy profiles with which the plan ends with the reserve at "
                    "the probability confidence",
                    false)
-          .number("value_of_time_w", within(in, &AutonomyInput::value_of_time_w), value_of_time_bounds_w,
+          .number("value_of_time_w", AT(input.value_of_time_w), value_of_time_bounds_w,
                   "value of time in minimum-energy profiles, W; the time_multiplier_w of a profile's "
                   "certificate, with or without a deadline, reproduces that profile",
                   0)
-          .include(pace_input(), within(in, &AutonomyInput::pace))
-          .number("confidence", within(in, &AutonomyInput::confidence), {.minimum = 0.01, .maximum = 0.999},
+          .include(pace_input(), AT(input.pace))
+          .number("confidence", AT(input.confidence), {.minimum = 0.01, .maximum = 0.999},
                   "probability for the latest departure", 0.95)
           .choice("dialect", &AutonomyRequest::dialect, dialect_names,
                   "format of the response: that of this service or a battery message of another standard",
                   static_cast<std::size_t>(Dialect::joulecast))
-          .object("start_pose", within(in, &AutonomyInput::start_pose),
+          .object("start_pose", AT(input.start_pose),
                   "start of the tasks; default: the robot's position, else the origin", pose_input())
-          .object("charger", within(in, &AutonomyInput::charger),
+          .object("charger", AT(input.charger),
                   "charger at which the plan ends: reached by a turn and a straight line, its length times "
                   "detour_factor",
                   charger)
-          .number("to_charger_m", within(in, &AutonomyInput::to_charger_m), charger_way_m,
+          .number("to_charger_m", AT(input.to_charger_m), charger_way_m,
                   "distance from the start to the charger, if its position is not given")
           .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
             context.input = &request.input;
           })
-          .list("tasks", within(in, &AutonomyInput::tasks), tasks_of_autonomy,
+          .list("tasks", AT(input.tasks), tasks_of_autonomy,
                 "tasks in the order of execution; null or absent: no task forecast", task_input(),
                 Presence::optional);
   return input;
@@ -225,67 +223,49 @@ std::optional<LatestDeparture> latest_departure(const PlanAnswer& plan) {
   return LatestDeparture{*plan.outlook.latest_departure, plan.input.confidence};
 }
 
-const Table<LatestDeparture>& departure_table() {
-  using D = LatestDeparture;
-  static const auto table =
-      Table<D>()
-          .value(
-              "after_tasks", [](const D& d) { return d.leave.after_tasks; },
-              "number of tasks before the departure; 0: immediate departure")
-          .number_or_null(
-              "at_s", [](const D& d) { return d.leave.at_s; }, "expected time from now when they are done")
-          .number_or_null(
-              "wait_s", [](const D& d) { return d.leave.wait_s; }, "permitted waiting time there")
-          .number_or_null(
-              "latest_s", [](const D& d) { return d.leave.at_s + d.leave.wait_s; }, "at_s + wait_s")
-          .number_or_null(
-              "probability", [](const D& d) { return d.leave.probability; },
-              "probability of reaching the charger with the reserve when leaving at at_s")
-          .number_or_null("confidence", &D::confidence, "as requested");
-  return table;
-}
-
 const Table<PlanAnswer>& plan_table() {
-  static const auto leg =
-      Table<PlannedTask>()
-          .value(
-              "task_id", [](const PlannedTask& task) { return task.task_id; },
-              "the caller's name of the task")
-          .include(
-              stage_table(), [](const PlannedTask& task) -> const auto& { return task.stage; });
+  static const auto departure =
+      Table<LatestDeparture>()
+          .value("after_tasks", AT(leave.after_tasks),
+                 "number of tasks before the departure; 0: immediate departure")
+          .number_or_null("at_s", AT(leave.at_s), "expected time from now when they are done")
+          .number_or_null("wait_s", AT(leave.wait_s), "permitted waiting time there")
+          .number_or_null(
+              "latest_s", [](const LatestDeparture& d) { return d.leave.at_s + d.leave.wait_s; },
+              "at_s + wait_s")
+          .number_or_null("probability", AT(leave.probability),
+                          "probability of reaching the charger with the reserve when leaving at at_s")
+          .number_or_null("confidence", &LatestDeparture::confidence, "as requested");
+  static const auto leg = Table<PlannedTask>()
+                              .value("task_id", AT(task_id), "the caller's name of the task")
+                              .include(stage_table(), AT(stage));
   static const auto task = Table<Place>()
                                .value("task", &Place::task, "index into tasks; null: the way to the charger")
                                .value("task_id", &Place::task_id, "null: the way to the charger");
   using P = PlanAnswer;
   static const auto table =
       Table<P>()
-          .number_or_null(
-              "success_probability", [](const P& p) { return p.outlook.probability; },
-              "probability of finishing all tasks and reaching the charger with the reserve")
-          .number_or_null(
-              "expected_energy_j", [](const P& p) { return p.outlook.mean_j; },
-              "mean of the distribution with the quantiles energy_j")
-          .number_or_null(
-              "duration_s", [](const P& p) { return p.outlook.duration_s[1]; }, "median")
+          .number_or_null("success_probability", AT(outlook.probability),
+                          "probability of finishing all tasks and reaching the charger with the reserve")
+          .number_or_null("expected_energy_j", AT(outlook.mean_j),
+                          "mean of the distribution with the quantiles energy_j")
+          .number_or_null("duration_s", AT(outlook.duration_s[1]), "median")
+          .object("energy_j", AT(outlook.energy_j), "total energy at the quantiles 5, 50 and 95 %",
+                  quantiles_table())
           .object(
-              "energy_j", [](const P& p) -> const auto& { return p.outlook.energy_j; },
-              "total energy at the quantiles 5, 50 and 95 %", quantiles_table())
-          .object(
-              "duration_quantiles_s", [](const P& p) -> const auto& { return p.outlook.duration_s; },
+              "duration_quantiles_s", AT(outlook.duration_s),
               "total duration at the quantiles 5, 50 and 95 %; all equal if the plan states the pace and all "
               "dwells",
               quantiles_table())
           .list("legs", planned_tasks, "one per task", leg)
-          .object(
-              "charger", [](const P& p) -> const auto& { return p.outlook.charger; },
-              "the way to the charger after the last task", stage_table())
+          .object("charger", AT(outlook.charger), "the way to the charger after the last task", stage_table())
           .object("fails_at", place(&Outlook::fails_at),
                   "first task at which use of the reserve is more likely than not; null: none", task)
           .object("likeliest_failure", place(&Outlook::likeliest_failure),
                   "task at which use of the reserve most likely begins; null: none", task)
           .object("latest_departure", latest_departure,
                   "last moment to leave for the charger; null: no charger given, or too late already",
-                  departure_table());
+                  departure);
   return table;
 }
 
@@ -301,8 +281,7 @@ const Table<Outlook>& end_table() {
       Table<Outlook>()
           .number_or_null("success_probability", &Outlook::probability, "probability that the charge lasts")
           .number_or_null("expected_energy_j", &Outlook::mean_j, "mean of the forecast's distribution")
-          .number_or_null(
-              "duration_s", [](const Outlook& o) { return o.duration_s[1]; }, "of the tasks")
+          .number_or_null("duration_s", AT(duration_s[1]), "of the tasks")
           .object("arrival_charge", charge_at_end, "charge at the end at the quantiles 5, 50 and 95 %",
                   quantiles_table());
   return table;
@@ -381,15 +360,12 @@ const Table<AutonomyAnswer>& consumption_table() {
           .value(
               "siblings", [](const A& a) { return a.forecaster().siblings; },
               "number of robots with equal body and motors used for the forecast")
-          .value(
-              "siblings_pending", [](const A& a) { return a.robot.siblings_pending; },
-              "the daemon has started and still reads missions of its siblings: the forecast will improve")
-          .number_or_null(
-              "energy_per_m_j", [](const A& a) { return a.output.reach.energy_per_m_j; },
-              "median consumption over the range: usable_energy_j / range_m")
-          .number_or_null(
-              "mean_power_w", [](const A& a) { return a.output.reach.mean_power_w; },
-              "median power over the run time: usable_energy_j / run_time_s")
+          .value("siblings_pending", AT(robot.siblings_pending),
+                 "the daemon has started and still reads missions of its siblings: the forecast will improve")
+          .number_or_null("energy_per_m_j", AT(output.reach.energy_per_m_j),
+                          "median consumption over the range: usable_energy_j / range_m")
+          .number_or_null("mean_power_w", AT(output.reach.mean_power_w),
+                          "median power over the run time: usable_energy_j / run_time_s")
           .number_or_null(
               "common_deviation", [](const A& a) { return a.track().inflation * a.track().common; },
               "relative standard deviation that all legs of a mission share")
@@ -424,7 +400,7 @@ const Table<Comparison>& comparison_table() {
   using C = Comparison;
   static const auto table =
       Table<C>()
-          .include(end_table(), [](const C& c) -> const Outlook& { return c.best; })
+          .include(end_table(), AT(best))
           .number_or_null(
               "saved_j", [](const C& c) { return c.usual.mean_j - c.best.mean_j; },
               "energy saved compared with usual driving")
@@ -445,19 +421,14 @@ const Table<AutonomyAnswer>& autonomy_table() {
       Table<A>("Remaining range and run time of a robot")
           .named("robot-autonomy")
           .include(model_table(), [](const A& a) -> const ModelInForce& { return *a.robot.model; })
-          .value(
-              "state_of_charge", [](const A& a) { return a.output.charge.fraction; },
-              "state of charge of the forecast, 0 to 1")
-          .number_or_null(
-              "state_of_charge_sd", [](const A& a) { return a.output.charge.deviation; },
-              "standard deviation; 0 if not available")
+          .value("state_of_charge", AT(output.charge.fraction), "state of charge of the forecast, 0 to 1")
+          .number_or_null("state_of_charge_sd", AT(output.charge.deviation),
+                          "standard deviation; 0 if not available")
           .text_or_null(
               "state_of_charge_limitation", [](const A& a) { return a.charging().charge_limitation; },
               "why the standard deviation is large, as a sentence; null: no such reason, or the request "
               "states the charge")
-          .value(
-              "reserve_fraction", [](const A& a) { return a.output.charge.reserve; },
-              "reserved share of the charge")
+          .value("reserve_fraction", AT(output.charge.reserve), "reserved share of the charge")
           .word("charging", charging_phase, std::array{"constant_current", "taper", "full"},
                 "present charging phase; null: not charging, or the request states the charge")
           .number_or_null(
@@ -467,29 +438,22 @@ const Table<AutonomyAnswer>& autonomy_table() {
           .number_or_null(
               "time_to_charged_sd_s", [](const A& a) { return a.charging().to_full.sd_s; },
               "standard deviation of time_to_charged_s")
-          .number_or_null(
-              "usable_energy_j", [](const A& a) { return a.output.reach.usable_j; },
-              "energy at the terminals above the reserve and the cut-off voltage")
-          .number_or_null(
-              "usable_energy_sd_j", [](const A& a) { return a.output.reach.usable_deviation_j; },
-              "standard deviation of usable_energy_j")
-          .number_or_null(
-              "payload_kg", [](const A& a) { return a.output.payload_kg; }, "payload of the forecast")
+          .number_or_null("usable_energy_j", AT(output.reach.usable_j),
+                          "energy at the terminals above the reserve and the cut-off voltage")
+          .number_or_null("usable_energy_sd_j", AT(output.reach.usable_deviation_j),
+                          "standard deviation of usable_energy_j")
+          .number_or_null("payload_kg", AT(output.payload_kg), "payload of the forecast")
           .word("driving", driven, std::array{"usual", "stated", "minimum_energy"},
                 "stated: at the pace of the request")
           .object("pace", std::identity(), "usual driving of the robot; null: not available", pace_table())
           .object("consumption", std::identity(), "expected consumption", consumption_table())
-          .number_or_null(
-              "range_m", [](const A& a) { return a.output.reach.range_m[1]; }, "median")
-          .number_or_null(
-              "run_time_s", [](const A& a) { return a.output.reach.run_time_s[1]; }, "median")
-          .object(
-              "range_quantiles_m", [](const A& a) -> const auto& { return a.output.reach.range_m; },
-              "remaining range with driving as in its recent legs; at the quantiles 5, 50 and 95 %",
-              quantiles_table())
-          .object(
-              "run_time_quantiles_s", [](const A& a) -> const auto& { return a.output.reach.run_time_s; },
-              "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
+          .number_or_null("range_m", AT(output.reach.range_m[1]), "median")
+          .number_or_null("run_time_s", AT(output.reach.run_time_s[1]), "median")
+          .object("range_quantiles_m", AT(output.reach.range_m),
+                  "remaining range with driving as in its recent legs; at the quantiles 5, 50 and 95 %",
+                  quantiles_table())
+          .object("run_time_quantiles_s", AT(output.reach.run_time_s),
+                  "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
           .object("drift", drift_of,
                   "the last change of the robot under this model, as in its gap history; null: none",
                   mark_table())
@@ -505,7 +469,7 @@ const Table<AutonomyAnswer>& autonomy_table() {
                   "exists",
                   comparison_table())
           .object(
-              "fastest", [](const A& a) -> const auto& { return a.output.fastest; },
+              "fastest", AT(output.fastest),
               "the plan driven as fast as the reserve allows with at least the requested confidence; null: "
               "not requested, or even minimum-energy profiles do not keep it",
               fastest);
@@ -515,7 +479,7 @@ const Table<AutonomyAnswer>& autonomy_table() {
 }  // namespace
 
 bool AutonomyRequest::former() const {
-  return std::ranges::any_of(input.tasks, [](const AutonomyTask& task) { return task.way.former; });
+  return std::ranges::any_of(input.tasks, AT(way.former));
 }
 
 described::Schemas autonomy_schemas() {

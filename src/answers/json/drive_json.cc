@@ -11,7 +11,6 @@ namespace {
 using described::Input;
 using described::Presence;
 using described::Table;
-using described::within;
 using planning::Limits;
 using planning::Point;
 using planning::Pose;
@@ -271,26 +270,24 @@ const Input<Way, PathContext>& former_way_input() {
 }
 
 const Input<DriveInput, PathContext>& drive_input() {
-  constexpr auto problem = &DriveInput::problem;
   static const auto input =
       Part<DriveInput>()
-          .object("limits", within(problem, &Problem::limits), "limits tighter than the robot's own",
-                  limits_input(), Presence::optional)
-          .number("start_speed_m_s", within(problem, &Problem::start_speed_m_s), not_negative,
-                  "speed at the start", 0, greatest_speed)
-          .number("end_speed_m_s", within(problem, &Problem::end_speed_m_s), not_negative, "speed at the end",
-                  0, greatest_speed)
-          .number("deadline_s", within(problem, &Problem::deadline_s), positive,
+          .object("limits", AT(problem.limits), "limits tighter than the robot's own", limits_input(),
+                  Presence::optional)
+          .number("start_speed_m_s", AT(problem.start_speed_m_s), not_negative, "speed at the start", 0,
+                  greatest_speed)
+          .number("end_speed_m_s", AT(problem.end_speed_m_s), not_negative, "speed at the end", 0,
+                  greatest_speed)
+          .number("deadline_s", AT(problem.deadline_s), positive,
                   "latest arrival, dwells included; absent: the duration of least cost")
-          .number("value_of_time_w", within(problem, &Problem::value_of_time_w), value_of_time_bounds_w,
+          .number("value_of_time_w", AT(problem.value_of_time_w), value_of_time_bounds_w,
                   "value of time, added to the energy", 0)
-          .number("regeneration", within(problem, &Problem::regeneration), fraction,
+          .number("regeneration", AT(problem.regeneration), fraction,
                   "recovered share of braking power; replaces that of the robot file")
-          .number("payload_kg", within(&DriveInput::options, &planning::PathOptions::payload_kg),
-                  not_negative, "at the start; with pickup, carried from there to dropoff", 0,
-                  payload_limit<DriveInput>)
-          .object("start_pose", within(&DriveInput::options, &planning::PathOptions::start),
-                  "where the path begins; default: the origin", pose_input(), Presence::optional)
+          .number("payload_kg", AT(options.payload_kg), not_negative,
+                  "at the start; with pickup, carried from there to dropoff", 0, payload_limit<DriveInput>)
+          .object("start_pose", AT(options.start), "where the path begins; default: the origin", pose_input(),
+                  Presence::optional)
           .include(way_input(), &DriveInput::way)
           .check([](Fields&, DriveInput& drive, PathContext&) {
             if (drive.way.stations) drive.options.payload_kg = 0;
@@ -319,10 +316,7 @@ const Table<Quantiles>& quantiles_table() {
 const Table<ModelInForce>& model_table() {
   static const auto table =
       Table<ModelInForce>()
-          .value(
-              "robot_id",
-              [](const ModelInForce& model) -> const std::string& { return model.robot.robot_id; },
-              "the robot's id, as in its telemetry and its file")
+          .value("robot_id", AT(robot.robot_id), "the robot's id, as in its telemetry and its file")
           .value("model_version", &ModelInForce::version,
                  "version of the robot's model that this is computed with");
   return table;

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "answers/json/drive_json.h"
-#include "answers/json/ledger_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
@@ -152,7 +152,7 @@ const Table<EstimateAnswer>& estimate_table() {
   using A = EstimateAnswer;
   static const auto table =
       Table<A>("Energy and ledger of a motion")
-          .include(model_table(), [](const A& a) -> const ModelInForce& { return a.model; })
+          .include(model_table(), AT(model))
           .word(
               "driving",
               [](const A& a) -> std::string_view {
@@ -160,35 +160,27 @@ const Table<EstimateAnswer>& estimate_table() {
                                                                            : name_of(a.input.driving);
               },
               std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
-          .value(
-              "energy_j", [](const A& a) { return a.output.energy_j; },
-              "from the battery; of usual driving the mean of its forecast")
-          .value(
-              "duration_s", [](const A& a) { return a.output.duration_s; }, "from start to end")
-          .value(
-              "distance_m", [](const A& a) { return a.output.distance_m; },
-              "driven distance, forward and backward both positive")
-          .value(
-              "turned_rad", [](const A& a) { return a.output.turned_rad; },
-              "turned angle, both senses positive")
-          .object(
-              "energy_quantiles_j", [](const A& a) -> const auto& { return a.output.energy_quantiles_j; },
-              "of usual driving, the forecast of energy_j; else null", quantiles_table())
+          .value("energy_j", AT(output.energy_j),
+                 "from the battery; of usual driving the mean of its forecast")
+          .value("duration_s", AT(output.duration_s), "from start to end")
+          .value("distance_m", AT(output.distance_m), "driven distance, forward and backward both positive")
+          .value("turned_rad", AT(output.turned_rad), "turned angle, both senses positive")
+          .object("energy_quantiles_j", AT(output.energy_quantiles_j),
+                  "of usual driving, the forecast of energy_j; else null", quantiles_table())
           .value("siblings_pending", [](const A&) { return true; },
                  "of usual driving while a started daemon still reads missions of its siblings: the forecast "
                  "will improve",
                  {{"const", true}})
-          .only([](const A& a) { return a.output.siblings_pending; })
+          .only(AT(output.siblings_pending))
           .list(
-              "beyond_limits", [](const A& a) -> const auto& { return a.output.beyond_limits; },
+              "beyond_limits", AT(output.beyond_limits),
               "limits of the robot that the given motion exceeds: speeds by more than 1e-6 of the limit; "
               "acceleration, current and voltage, which are computed from the slope of rounded speeds, by "
               "more than 0.0015 of it, current and voltage only while a wheel turns at 0.05 rad/s or faster. "
               "Empty for a path: its plan satisfies the limits",
               broken)
-          .object(
-              "ledger", [](const A& a) -> const auto& { return a.output.accounts; },
-              "null for usual driving: its forecast has no terms", ledger_table())
+          .object("ledger", AT(output.accounts), "null for usual driving: its forecast has no terms",
+                  ledger_table())
           .object(
               "profile", [](const A& a) -> const auto& { return *a.output.columns; },
               "the motion over time, if columns are requested; positions are null without start_pose",

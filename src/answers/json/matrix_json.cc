@@ -19,7 +19,6 @@ using described::Count;
 using described::Input;
 using described::Presence;
 using described::Table;
-using described::within;
 using planning::MatrixTask;
 using Robot = MatrixInput::Robot;
 
@@ -50,15 +49,14 @@ void make_leg(Fields& fields, ReadLeg& read, PathContext&) {
 }
 
 const Input<ReadLeg, PathContext>& leg_input() {
-  static const auto input =
-      Input<ReadLeg, PathContext>("A route; empty: none to drive")
-          .named("leg")
-          .object("start_pose", within(&ReadLeg::options, &planning::PathOptions::start),
-                  "where a path with places on the map begins; default: the origin", pose_input(),
-                  Presence::optional)
-          .include(route_input(), &ReadLeg::way)
-          .include(former_way_input(), &ReadLeg::way)
-          .check(make_leg);
+  static const auto input = Input<ReadLeg, PathContext>("A route; empty: none to drive")
+                                .named("leg")
+                                .object("start_pose", AT(options.start),
+                                        "where a path with places on the map begins; default: the origin",
+                                        pose_input(), Presence::optional)
+                                .include(route_input(), &ReadLeg::way)
+                                .include(former_way_input(), &ReadLeg::way)
+                                .check(make_leg);
   return input;
 }
 
@@ -115,13 +113,12 @@ void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
 }
 
 const Input<ReadTask, MatrixContext>& matrix_task_input() {
-  constexpr auto task = &ReadTask::task;
   static const auto input =
       Input<ReadTask, MatrixContext>()
           .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
-          .number("payload_kg", within(task, &MatrixTask::payload_kg), {.minimum = 0, .maximum = 1e5},
+          .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
                   "carried from the pick-up to the drop-off", 0)
-          .include(stations_input(), within(task, &MatrixTask::stations))
+          .include(stations_input(), AT(task.stations))
           .custom("empty",
                   {{"oneOf", {leg_input().of_member(), described::of_array(leg_input().of_member())}}},
                   "route to the pick-up, common to all robots or one for each in order; replaces a turn "
@@ -214,16 +211,13 @@ const Table<MatrixInput>& head_table() {
           .word(
               "driving", [](const MatrixInput& input) -> std::string_view { return name_of(input.driving); },
               driving_names, "as requested, or the default")
-          .value(
-              "value_of_time_w", [](const MatrixInput& input) { return input.options.value_of_time_w; },
-              "requested value of time")
+          .value("value_of_time_w", AT(options.value_of_time_w), "requested value of time")
           .texts("task_ids", &MatrixInput::task_ids, "ids in the order of the columns")
           .texts("tasks", &MatrixInput::task_ids, "task_ids by its former name", {{"deprecated", true}});
   return table;
 }
 
 const Input<MatrixInput, MatrixContext>& matrix_input() {
-  constexpr auto options = &MatrixInput::options;
   static const auto input =
       Input<MatrixInput, MatrixContext>(
           "Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
@@ -233,9 +227,9 @@ const Input<MatrixInput, MatrixContext>& matrix_input() {
                   "estimated from its missions, for fleets that do not drive the planner's profiles. "
                   "value_of_time_w and regeneration are valid only with minimum_energy",
                   static_cast<std::size_t>(Driving::minimum_energy))
-          .number("value_of_time_w", within(options, &planning::CostOptions::value_of_time_w),
-                  value_of_time_bounds_w, "value of time, added to the energy", 0)
-          .number("regeneration", within(options, &planning::CostOptions::regeneration), fraction,
+          .number("value_of_time_w", AT(options.value_of_time_w), value_of_time_bounds_w,
+                  "value of time, added to the energy", 0)
+          .number("regeneration", AT(options.regeneration), fraction,
                   "recovered share of braking power; replaces that of each robot file")
           .number("reserve_fraction", &MatrixInput::reserve_fraction, fraction,
                   "charge to be left after a task, for its success probability; default the robot file's")

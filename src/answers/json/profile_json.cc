@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "answers/json/drive_json.h"
-#include "answers/json/ledger_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
@@ -18,22 +18,6 @@ using planning::Certificate;
 using planning::PlanCost;
 
 constexpr const char* drawn_words = "energy drawn from the battery";
-
-const Table<planning::Summary>& summary_table() {
-  using S = planning::Summary;
-  static const auto table =
-      Table<S>()
-          .value("energy_j", &S::energy_j, drawn_words)
-          .value("duration_s", &S::duration_s, "from start to end")
-          .value("distance_m", &S::distance_m, "driven distance, forward and backward both positive")
-          .value("turned_rad", &S::turned_rad, "turned angle, both senses positive")
-          .value("peak_speed_m_s", &S::peak_speed_m_s, "greatest speed")
-          .value("peak_yaw_rate_rad_s", &S::peak_yaw_rate_rad_s, "greatest rate of turning")
-          .value("peak_power_w", &S::peak_power_w, "greatest power from the battery")
-          .value("braking_j", &S::braking_j, "energy that braking turns to heat or returns")
-          .value("recovered_j", &S::recovered_j, "of braking_j, returned to the battery");
-  return table;
-}
 
 std::vector<std::string_view> names_of(const std::vector<planning::Bound>& bounds) {
   std::vector<std::string_view> names;
@@ -82,34 +66,6 @@ struct BaselineAnswer {
   bool columns;
 };
 
-const Table<BaselineAnswer>& baseline_table() {
-  static const auto motion =
-      Table<Baseline>()
-          .column("time_s", &Baseline::time_s, "time since the start")
-          .column("speed_m_s", &Baseline::speed_m_s, "forward speed; negative: backwards")
-          .column("yaw_rate_rad_s", &Baseline::yaw_rate_rad_s, "rate of turning, positive to the left")
-          .column("power_w", &Baseline::power_w, "power drawn from the battery", 4)
-          .column("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", 4);
-  static const auto figures = Table<Baseline>()
-                                  .value("energy_j", &Baseline::energy_j, drawn_words)
-                                  .value("duration_s", &Baseline::duration_s, "from start to end")
-                                  .value("peak_speed_m_s", &Baseline::peak_speed_m_s, "greatest speed");
-  using A = BaselineAnswer;
-  const auto motion_of = [](const A& a) -> const Baseline& { return a.baseline.motion; };
-  static const auto table =
-      Table<A>()
-          .include(figures, motion_of)
-          .value(
-              "within_limits", [](const A& a) { return a.baseline.within_limits; },
-              "whether the robot can drive it")
-          .value(
-              "saving_fraction", [](const A& a) { return a.baseline.saving_fraction; },
-              "relative energy saving of the optimum compared with it")
-          .object("profile", motion_of, "its motion over time, if baseline_columns is requested", motion)
-          .only([](const A& a) { return a.columns; });
-  return table;
-}
-
 struct ProfileAnswer {
   const ProfileInput& input;
   const ProfileOutput& output;
@@ -118,7 +74,25 @@ struct ProfileAnswer {
 
 const Table<ProfileAnswer>& baselines_table() {
   using A = ProfileAnswer;
-  const auto baseline = [](std::optional<ProfileOutput::Baseline> ProfileOutput::*member) {
+  static const auto motion =
+      Table<Baseline>()
+          .column("time_s", &Baseline::time_s, "time since the start")
+          .column("speed_m_s", &Baseline::speed_m_s, "forward speed; negative: backwards")
+          .column("yaw_rate_rad_s", &Baseline::yaw_rate_rad_s, "rate of turning, positive to the left")
+          .column("power_w", &Baseline::power_w, "power drawn from the battery", 4)
+          .column("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", 4);
+  static const auto baseline =
+      Table<BaselineAnswer>()
+          .value("energy_j", AT(baseline.motion.energy_j), drawn_words)
+          .value("duration_s", AT(baseline.motion.duration_s), "from start to end")
+          .value("peak_speed_m_s", AT(baseline.motion.peak_speed_m_s), "greatest speed")
+          .value("within_limits", AT(baseline.within_limits), "whether the robot can drive it")
+          .value("saving_fraction", AT(baseline.saving_fraction),
+                 "relative energy saving of the optimum compared with it")
+          .object("profile", AT(baseline.motion), "its motion over time, if baseline_columns is requested",
+                  motion)
+          .only(AT(columns));
+  const auto shape = [](std::optional<ProfileOutput::Baseline> ProfileOutput::*member) {
     return [member](const A& a) -> std::optional<BaselineAnswer> {
       if (!(a.output.*member)) return std::nullopt;
       return BaselineAnswer{*(a.output.*member), a.input.baseline_columns};
@@ -127,12 +101,12 @@ const Table<ProfileAnswer>& baselines_table() {
   static const auto table =
       Table<A>()
           .object(
-              "trapezoid", baseline(&ProfileOutput::trapezoid),
+              "trapezoid", shape(&ProfileOutput::trapezoid),
               "constant acceleration, constant speed, constant deceleration; null: not possible on the path",
-              baseline_table())
-          .object("triangle", baseline(&ProfileOutput::triangle),
+              baseline)
+          .object("triangle", shape(&ProfileOutput::triangle),
                   "constant acceleration, then constant deceleration; null: not possible on the path",
-                  baseline_table());
+                  baseline);
   return table;
 }
 
@@ -143,10 +117,7 @@ const described::Input<ProfileInput, PathContext>& profile_input() {
       described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
           .include(drive_input(), &ProfileInput::drive)
           .number(
-              "energy_budget_j",
-              described::within(&ProfileInput::drive, &DriveInput::problem,
-                                &planning::Problem::energy_budget_j),
-              positive,
+              "energy_budget_j", AT(drive.problem.energy_budget_j), positive,
               "the fastest motion that takes at most so much energy; without deadline_s and value_of_time_w")
           .check([](Fields& fields, ProfileInput& profile, PathContext&) {
             const planning::Problem& problem = profile.drive.problem;
@@ -181,28 +152,32 @@ const Table<ProfileAnswer>& profile_table() {
   using A = ProfileAnswer;
   static const auto table =
       Table<A>("A minimum-energy motion")
-          .include(model_table(), [](const A& a) -> const ModelInForce& { return a.model; })
-          .include(
-              summary_table(), [](const A& a) -> const auto& { return a.output.plan.summary; })
-          .object(
-              "certificate", [](const A& a) -> const auto& { return a.output.plan.certificate; },
-              "proof of its distance from the optimum", certificate_table())
-          .object(
-              "ledger_j", [](const A& a) -> const auto& { return a.output.plan.ledger; }, "energy by term",
-              terms_table())
+          .include(model_table(), AT(model))
+          .value("energy_j", AT(output.plan.summary.energy_j), drawn_words)
+          .value("duration_s", AT(output.plan.summary.duration_s), "from start to end")
+          .value("distance_m", AT(output.plan.summary.distance_m),
+                 "driven distance, forward and backward both positive")
+          .value("turned_rad", AT(output.plan.summary.turned_rad), "turned angle, both senses positive")
+          .value("peak_speed_m_s", AT(output.plan.summary.peak_speed_m_s), "greatest speed")
+          .value("peak_yaw_rate_rad_s", AT(output.plan.summary.peak_yaw_rate_rad_s),
+                 "greatest rate of turning")
+          .value("peak_power_w", AT(output.plan.summary.peak_power_w), "greatest power from the battery")
+          .value("braking_j", AT(output.plan.summary.braking_j),
+                 "energy that braking turns to heat or returns")
+          .value("recovered_j", AT(output.plan.summary.recovered_j), "of braking_j, returned to the battery")
+          .object("certificate", AT(output.plan.certificate), "proof of its distance from the optimum",
+                  certificate_table())
+          .object("ledger_j", AT(output.plan.ledger), "energy by term", terms_table())
           .object("baselines", std::identity(),
                   "profiles of the same duration on every run between stops; null: no such profile exists",
                   baselines_table())
-          .value(
-              "needed_speed_m_s", [](const A& a) { return a.output.needed_speed_m_s; },
-              "lowest speed limit with which the deadline can be met; null without a deadline")
-          .list(
-              "pareto", [](const A& a) -> const auto& { return a.output.pareto; },
-              "other compromises between time and energy, in the requested number", point)
-          .object(
-              "profile", [](const A& a) -> const auto& { return a.output.plan.profile; },
-              "the motion over time, if columns are requested", columns_table(false))
-          .only([](const A& a) { return a.input.columns; });
+          .value("needed_speed_m_s", AT(output.needed_speed_m_s),
+                 "lowest speed limit with which the deadline can be met; null without a deadline")
+          .list("pareto", AT(output.pareto),
+                "other compromises between time and energy, in the requested number", point)
+          .object("profile", AT(output.plan.profile), "the motion over time, if columns are requested",
+                  columns_table(false))
+          .only(AT(input.columns));
   return table;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/try.h"
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
 #include "gap/diagnose/ripple.h"
@@ -52,9 +53,7 @@ class Diagnoser {
     d_.robot_id = recordings_.robot_id;
     d_.missions = recordings_.missions.size();
     d_.samples = recordings_.samples;
-    auto adopted = dynamics::active_effects(robot_);
-    if (!adopted) return tl::unexpected(adopted.error());
-    adopted_ = std::move(*adopted);
+    TRY_ASSIGN(adopted_, dynamics::active_effects(robot_));
     if (!prepare()) return nothing_to_judge();
     measure();
     const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
@@ -387,9 +386,8 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
-    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, progress, {}).run();
-    if (!earlier) return earlier;
-    d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
+    TRY_ASSIGN(const Diagnosis earlier, Diagnoser((*sides)[0], robot, progress, {}).run());
+    d->notes.push_back(earlier_words(earlier, (*sides)[1].missions.front().mission_id));
   }
   return d;
 }

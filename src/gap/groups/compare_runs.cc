@@ -1,3 +1,4 @@
+#include "base/try.h"
 #include "gap/groups/comparer.h"
 #include "gap/runs/run_checks.h"
 
@@ -5,12 +6,11 @@ namespace joulecast::gap {
 
 Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> group_of_run,
                                 const robot::RobotModel& robot, const Progress& progress) {
-  auto in_file = dynamics::active_effects(robot);
-  if (!in_file) return tl::unexpected(in_file.error());
+  TRY_ASSIGN(auto in_file, dynamics::active_effects(robot));
   Comparison c;
   const std::vector<std::size_t> groups = name_groups(group_of_run, c);
   if (c.groups.size() < 2) return invalid("--compare-by", "gives one group only; two are needed to compare");
-  RunRows rows(set, robot, *std::move(in_file));
+  RunRows rows(set, robot, std::move(in_file));
   RunChecks checked = check_runs(rows);
   c.diagnosis.checks = std::move(checked.checks);
   rows.silence(checked.apart);

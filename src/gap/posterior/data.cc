@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/try.h"
 #include "gap/equations/power.h"
 #include "gap/posterior/constants.h"
 #include "statistics/robust.h"
@@ -138,9 +139,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
                        double electrical_delay_s) {
   Data d;
   d.robot = robot;
-  auto in_file = dynamics::active_effects(robot);
-  if (!in_file) return tl::unexpected(in_file.error());
-  d.in_file = std::move(*in_file);
+  TRY_ASSIGN(d.in_file, dynamics::active_effects(robot));
   d.missions = missions.size();
   d.covariates = windows::covariate_names(missions);
   const windows::Readings readings = windows::find_readings(missions);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/try.h"
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
 #include "statistics/robust.h"
@@ -486,9 +487,8 @@ std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double me
 
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot) {
-  const Result<std::unique_ptr<Fit>> fit = fit_missions(recordings.missions, robot);
-  if (!fit) return tl::unexpected(fit.error());
-  return explain(**fit);
+  TRY_ASSIGN(const std::unique_ptr<Fit> fit, fit_missions(recordings.missions, robot));
+  return explain(*fit);
 }
 
 }  // namespace joulecast::gap::posterior

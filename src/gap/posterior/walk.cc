@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/try.h"
+
 namespace joulecast::gap::posterior {
 namespace {
 
@@ -162,9 +164,8 @@ Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> 
   std::unique_ptr<Fit> fit;
   double taken_out_s = 0;
   for (int round = 0; round < most_delay_rounds; ++round) {
-    Result<Data> data = make_data(missions, robot, taken_out_s);
-    if (!data) return tl::unexpected(data.error());
-    fit = walk(std::move(*data), goes_on);
+    TRY_ASSIGN(Data data, make_data(missions, robot, taken_out_s));
+    fit = walk(std::move(data), goes_on);
     if (!fit) break;
     const double found_s = sensor_delay_s(*fit);
     if (std::fabs(found_s - taken_out_s) < settled_delay_s) break;

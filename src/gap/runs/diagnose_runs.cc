@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "base/try.h"
 #include "gap/runs/run_checks.h"
 #include "gap/verdict/answer.h"
 #include "gap/verdict/words.h"
@@ -272,8 +273,7 @@ class RunDiagnoser {
 
 Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& robot, bool robot_file_model,
                                    const Progress& progress) {
-  auto adopted = dynamics::active_effects(robot);
-  if (!adopted) return tl::unexpected(adopted.error());
+  TRY_ASSIGN(auto adopted, dynamics::active_effects(robot));
   RunSet judged = set;
   if (robot_file_model) {
     for (MissionRun& run : judged.runs) {
@@ -281,7 +281,7 @@ Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& r
       run.model_motor_j = {MissionRun::absent, MissionRun::absent};
     }
   }
-  return RunDiagnoser(judged, robot, *std::move(adopted), progress).run();
+  return RunDiagnoser(judged, robot, std::move(adopted), progress).run();
 }
 
 }  // namespace joulecast::gap

@@ -9,7 +9,6 @@ namespace joulecast::gap {
 namespace {
 
 using described::Table;
-using described::within;
 
 const Table<LeftOut>& condition_table() {
   using L = LeftOut;
@@ -31,8 +30,8 @@ const Table<JudgedRun>& run_table() {
   using J = JudgedRun;
   static const auto table =
       Table<J>()
-          .value("run", within(&J::run, &MissionRun::name), "name of the run")
-          .value("table", within(&J::run, &MissionRun::table), "name of its table")
+          .value("run", AT(run.name), "name of the run")
+          .value("table", AT(run.table), "name of its table")
           .number_or_null(
               "measured_j", [](const J& run) { return run.run.measured_j(); }, "measured energy")
           .number_or_null("model_j", &J::model_j, "energy by the model")

@@ -103,9 +103,8 @@ Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
       others.push_back(effect);
     }
   }
-  Result<robot::RobotModel> corrected = robot::parse_robot(file.dump());
-  if (!corrected) return corrected;
-  return with_effects(std::move(*corrected), others);
+  TRY_ASSIGN(auto corrected, robot::parse_robot(file.dump()));
+  return with_effects(std::move(corrected), others);
 }
 
 std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
