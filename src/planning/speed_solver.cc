@@ -50,9 +50,15 @@ constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
 constexpr double quick_decrease = 0.05;   // after a full step with a decrement below the gap
 constexpr int most_iterations = 200;
 
+// Bounds of a cell: acceleration, positive and negative; ceiling and floor of its first node; of the motors.
+constexpr unsigned of_acceleration = 0, of_ceiling = 2, of_floor = 3, of_motors = 4;
+
 // The first of the two bounds, positive and negative, of a motor at an end of a cell.
 constexpr unsigned bound_of(std::size_t end, std::size_t side, bool voltage) {
-  return static_cast<unsigned>(2 + 8 * end + (voltage ? 4 : 0) + 2 * side);
+  return static_cast<unsigned>(of_motors + 8 * end + (voltage ? 4 : 0) + 2 * side);
+}
+constexpr std::uint32_t bits(unsigned two_from) {
+  return 3u << two_from;
 }
 constexpr std::uint32_t at_both_ends = 1u | 1u << (bound_of(1, 0, false) - bound_of(0, 0, false));
 
@@ -81,17 +87,16 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   assert(n >= 2 && grid_.ceiling.size() == n + 1);
   set_return(grid_.electric.down);
   cells_.resize(n);
-  for (auto* v : {&z_, &trial_, &ceiling_multiplier_, &floor_multiplier_, &gradient_, &stationarity_,
-                  &diagonal_, &off_, &magnitude_, &pivot_, &lower_, &step_}) {
+  for (auto* v :
+       {&z_, &trial_, &gradient_, &stationarity_, &diagonal_, &off_, &magnitude_, &pivot_, &lower_, &step_})
     v->assign(n + 1, 0);
-  }
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
   for (const WheelLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
   const std::vector<double> fastest = fastest_without_motors(grid_);
   for (std::size_t k = 0; k < n; ++k) {
-    std::uint32_t mask = 0;
-    if (std::isfinite(grid_.acceleration_limit)) mask = 3;
+    std::uint32_t mask = k > 0 ? bits(of_ceiling) : 0;
+    if (std::isfinite(grid_.acceleration_limit)) mask |= bits(of_acceleration);
     // A bound is left out where no speed and acceleration inside the others can reach it.
     const double v = std::sqrt(std::max(fastest[k], fastest[k + 1]));
     for (const std::size_t end : {0u, 1u}) {
@@ -104,11 +109,10 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
       }
     }
     bounds_[k] = mask;
-    bounds_motors_ = bounds_motors_ || mask > 3;
+    bounds_motors_ = bounds_motors_ || mask >> of_motors;
     first_bound_[k + 1] = first_bound_[k] + static_cast<std::size_t>(std::popcount(mask));
   }
   bound_states_.resize(first_bound_.back());
-  bound_total_ = 2 * (n - 1) + bound_states_.size();
 }
 
 const SpeedEnvelope& SpeedSolver::envelope() {
@@ -180,12 +184,17 @@ template <class Visit>
 void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const {
   const unsigned mask = bounds_[cell];
   const double p = 0.5 / grid_.step[cell], q = (z1 - z0) * p;
-  if (mask & 3u) {
+  if (mask & bits(of_acceleration)) {
     const double a = 1 / grid_.acceleration_limit;
-    visit(0u, q * a - 1, -p * a, p * a, 0.0, 0.0, 0.0);
-    visit(1u, -q * a - 1, p * a, -p * a, 0.0, 0.0, 0.0);
+    visit(of_acceleration, q * a - 1, -p * a, p * a, 0.0, 0.0, 0.0);
+    visit(of_acceleration + 1, -q * a - 1, p * a, -p * a, 0.0, 0.0, 0.0);
   }
-  if (mask < 4u) return;
+  if (mask & bits(of_ceiling)) {
+    const double a = 1 / grid_.ceiling[cell];
+    visit(of_ceiling, z0 * a - 1, a, 0.0, 0.0, 0.0, 0.0);
+    visit(of_floor, (floor_[cell] - z0) * a, -a, 0.0, 0.0, 0.0, 0.0);
+  }
+  if (!(mask >> of_motors)) return;
   for (const std::size_t end : {0u, 1u}) {
     if (!(mask >> bound_of(end, 0, false) & 0xffu)) continue;
     const double z = end == 0 ? z0 : z1, v = std::sqrt(z);
@@ -203,7 +212,7 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
     };
     for (const std::size_t s : {0u, 1u}) {
       const unsigned of_torque = bound_of(end, s, false), of_voltage = bound_of(end, s, true);
-      if (!(mask & (3u << of_torque | 3u << of_voltage))) continue;
+      if (!(mask & (bits(of_torque) | bits(of_voltage)))) continue;
       const WheelLoad& w = grid_.load(cell, end)[s];
       const Torque creeping = torque(w, v, q), rolling = w.creep != 0 ? torque(w.rolling(), v, q) : creeping;
       const Electric& e = grid_.electric;
@@ -221,11 +230,7 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
 }
 
 bool SpeedSolver::inside(const std::vector<double>& z) const {
-  const std::size_t n = grid_.cells();
-  for (std::size_t k = 1; k < n; ++k) {
-    if (!(z[k] > floor_[k] && z[k] < grid_.ceiling[k])) return false;
-  }
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
     bool ok = true;
     each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) { ok = ok && g < 0; });
     if (!ok) return false;
@@ -245,11 +250,6 @@ double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
       ok = ok && g < 0;
       if (ok) logs.add(-g);
     });
-    if (k > 0) {
-      const double room = 1 - z[k] / grid_.ceiling[k];
-      ok = ok && room > 0 && z[k] > floor_[k];
-      if (ok) logs.add(room), logs.add((z[k] - floor_[k]) / grid_.ceiling[k]);
-    }
     if (!ok) return std::numeric_limits<double>::infinity();
     sum += cost(k, v, q);
   }
@@ -360,13 +360,6 @@ void SpeedSolver::assemble(double mu) {
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
         magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
   }
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
-    logs.add(high), logs.add(low);
-    diagonal_[k] += a * a * (ceiling_multiplier_[k] / high + floor_multiplier_[k] / low);
-    gradient_[k] += mu * a * (1 / high - 1 / low);
-    stationarity_[k] += a * (ceiling_multiplier_[k] - floor_multiplier_[k]);
-  }
   merit_here_ = cost_here_ - mu * logs.sum();
 }
 
@@ -475,15 +468,10 @@ double SpeedSolver::BarrierSchedule::gear_width() const {
 }
 
 void SpeedSolver::start_duals(double mu) {
-  const std::size_t n = grid_.cells();
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
     BoundState* state = bound_states_.data() + first_bound_[k];
     each_bound(k, z_[k], z_[k + 1], [&](unsigned, double g, auto...) { state++->multiplier = mu / -g; });
     cells_[k].kink = {0, 0};
-  }
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k];
-    ceiling_multiplier_[k] = mu / (1 - z_[k] * a), floor_multiplier_[k] = mu / ((z_[k] - floor_[k]) * a);
   }
 }
 
@@ -505,12 +493,7 @@ bool SpeedSolver::regularise(double damping, bool& corrected) {
 
 // Sum of multipliers times slacks.
 double SpeedSolver::complementarity() const {
-  const std::size_t n = grid_.cells();
   double gap = 0;
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k];
-    gap += ceiling_multiplier_[k] * (1 - z_[k] * a) + floor_multiplier_[k] * (z_[k] - floor_[k]) * a;
-  }
   for (const BoundState& b : bound_states_) gap += b.multiplier * b.slack;
   return gap;
 }
@@ -519,7 +502,7 @@ std::vector<double> SpeedSolver::cost_of_ends() const {
   if (!bounds_motors_) return {};
   std::vector<double> cost(grid_.cells(), 0);
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
-    const auto motors = bounds_of(k).subspan(bounds_[k] & 3u ? 2 : 0);
+    const auto motors = bounds_of(k).last(static_cast<std::size_t>(std::popcount(bounds_[k] >> of_motors)));
     for (std::size_t i = 0; i < motors.size() / 2; ++i) {
       const BoundState &near = motors[i], &far = motors[i + motors.size() / 2];
       const BoundState& fuller = near.slack < far.slack ? near : far;
@@ -539,15 +522,10 @@ double SpeedSolver::stationarity_residual() const {
 
 // Longest step that keeps a share of every bound's slack, the motors' linearised.
 double SpeedSolver::step_to_boundary() const {
-  const std::size_t n = grid_.cells();
   double longest = 1;
-  for (std::size_t k = 1; k < n; ++k) {
-    shorten(z_[k] - floor_[k], step_[k], longest);
-    shorten(grid_.ceiling[k] - z_[k], -step_[k], longest);
-  }
-  for (std::size_t k = 0; k < n; ++k)
+  for (std::size_t k = 0; k < grid_.cells(); ++k)
     for (const BoundState& b : bounds_of(k)) {
-      const double room = b.index < 2 ? b.slack : linear_share * b.slack;
+      const double room = b.index < of_motors ? b.slack : linear_share * b.slack;
       shorten(room, -b.change(step_[k], step_[k + 1]), longest);
     }
   return longest;
@@ -567,12 +545,11 @@ double SpeedSolver::line_search(double longest, double decrement, double mu, dou
 
 // Multipliers and the kinks' slopes follow their linearised equations along the step.
 void SpeedSolver::update_duals(double mu) {
-  const std::size_t n = grid_.cells();
   // Each multiplier keeps a share of itself: one that ends at zero does not shorten the others' steps.
   const auto follow = [](double& multiplier, double change) {
     multiplier = std::max((1 - to_boundary) * multiplier, multiplier + change);
   };
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
     Cell& c = cells_[k];
     const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
     const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
@@ -581,13 +558,6 @@ void SpeedSolver::update_duals(double mu) {
       follow(b.multiplier,
              mu / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]));
     if (half_jump_ != 0) follow_kinks(c, dv, dq);
-  }
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k], d = step_[k] * a;
-    const double high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
-    double &up = ceiling_multiplier_[k], &down = floor_multiplier_[k];
-    follow(up, mu / high - up + up / high * d);
-    follow(down, mu / low - down - down / low * d);
   }
 }
 
@@ -603,16 +573,13 @@ void SpeedSolver::follow_kinks(Cell& c, double dv, double dq) const {
 // A bound binds where its multiplier outweighs its slack; `unit_j` is the scale of multipliers.
 std::array<bool, bound_count> SpeedSolver::binding(double unit_j) const {
   std::array<bool, bound_count> binding{};
-  const auto binds = [&](double multiplier, double slack, Bound b) {
-    if (slack <= 1e-3 && multiplier * 1e-3 > slack * unit_j) binding[static_cast<std::size_t>(b)] = true;
-  };
-  for (std::size_t k = 0; k < grid_.cells(); ++k) {
-    for (const BoundState& b : bounds_of(k))
-      binds(b.multiplier, b.slack,
-            b.index < 2             ? Bound::acceleration
-            : (b.index - 2) % 8 < 4 ? Bound::current
-                                    : Bound::voltage);
-    if (k > 0) binds(ceiling_multiplier_[k], 1 - z_[k] / grid_.ceiling[k], Bound::speed);
+  for (const BoundState& b : bound_states_) {
+    if (b.index == of_floor || b.slack > 1e-3 || b.multiplier * 1e-3 <= b.slack * unit_j) continue;
+    const Bound bound = b.index < of_ceiling            ? Bound::acceleration
+                        : b.index == of_ceiling         ? Bound::speed
+                        : (b.index - of_motors) % 8 < 4 ? Bound::current
+                                                        : Bound::voltage;
+    binding[static_cast<std::size_t>(bound)] = true;
   }
   return binding;
 }
@@ -672,7 +639,8 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
   last_idle_ = idle_;
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
-  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, gap);
+  BarrierSchedule barrier(grid_, static_cast<double>(bound_states_.size()), std::fabs(merit(z_, 0)),
+                          tolerance, gap);
   const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
   smooth();
   start_duals(barrier.mu());
@@ -711,7 +679,7 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     smooth();
   }
   if (!solution.converged) way_.clear();
-  solution.binding = binding(barrier.scale() / static_cast<double>(bound_total_));
+  solution.binding = binding(barrier.scale() / static_cast<double>(bound_states_.size()));
   finish(solution, price_w);
   return solution;
 }

@@ -68,7 +68,8 @@ class SpeedSolver {
     std::array<double, 2> kink{};  // dual of phi's slope, in (-1, 1)
     std::array<Energy, 2> energy{};
   };
-  // A bound of a cell: 2 of acceleration; at either end 4 of torque, 4 of voltage.
+  // A bound of a cell: 2 of acceleration, 2 of the speed at its first node; at either end 4 of torque, 4 of
+  // voltage.
   struct BoundState {
     double multiplier = 0, slack = 0, by_z0 = 0, by_z1 = 0;
     unsigned index = 0;
@@ -136,7 +137,6 @@ class SpeedSolver {
   std::vector<std::uint32_t> bounds_;     // mask of bounds that can bind, per cell
   std::vector<std::size_t> first_bound_;  // of each cell in the following
   std::vector<BoundState> bound_states_;
-  std::size_t bound_total_ = 0;
   // Of the last solve: a profile for each barrier that was about solved, and its gap.
   struct Passed {
     double gap;
@@ -146,7 +146,6 @@ class SpeedSolver {
   double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
-  std::vector<double> ceiling_multiplier_, floor_multiplier_;
   std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
