@@ -35,6 +35,9 @@ namespace {
 
 constexpr double to_boundary = 0.995;         // of a slack may be used up: tau of N&W (19.9)
 constexpr double linear_share = 0.9;          // of it where a bound bends; without, 7 % more steps
+constexpr double long_enough = 0.9;           // a step that is not corrected
+constexpr int most_corrections = 4;           // of a step; 6 and 10 take no fewer steps
+constexpr double least_product = 0.3;         // of s y over mu, after a step; 0.1 and 0.5 are like it
 constexpr double sufficient_decrease = 1e-4;  // c_1 of N&W (3.4)
 constexpr double first_correction = 1e-9;     // of the diagonal, W&B algorithm IC
 constexpr double correction_growth = 8;       // kappa_w+ of W&B algorithm IC
@@ -87,8 +90,8 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   assert(n >= 2 && grid_.ceiling.size() == n + 1);
   set_return(grid_.electric.down);
   cells_.resize(n);
-  for (auto* v :
-       {&z_, &trial_, &gradient_, &stationarity_, &diagonal_, &off_, &magnitude_, &pivot_, &lower_, &step_})
+  for (auto* v : {&z_, &trial_, &gradient_, &slope_, &stationarity_, &diagonal_, &off_, &magnitude_, &pivot_,
+                  &lower_, &step_})
     v->assign(n + 1, 0);
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
@@ -348,7 +351,7 @@ void SpeedSolver::assemble(double mu) {
     each_bound(k, z0, z1,
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
                  const double slack = -g, y = state->multiplier, weight = y / slack;
-                 *state++ = {y, slack, g0, g1, j};
+                 *state++ = {y, slack, g0, g1, mu, j};
                  logs.add(slack);
                  d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
                      d01 += weight * g0 * g1 + y * g01;
@@ -361,6 +364,7 @@ void SpeedSolver::assemble(double mu) {
         magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
   }
   merit_here_ = cost_here_ - mu * logs.sum();
+  slope_ = gradient_;
 }
 
 // LDL' of the tridiagonal matrix over the inner nodes; false when it is not positive definite.
@@ -379,8 +383,8 @@ bool SpeedSolver::factorise() {
 void SpeedSolver::solve_step() {
   const std::size_t n = grid_.cells();
   step_[0] = step_[n] = 0;
-  step_[1] = -gradient_[1];
-  for (std::size_t k = 2; k < n; ++k) step_[k] = -gradient_[k] - lower_[k] * step_[k - 1];
+  step_[1] = -slope_[1];
+  for (std::size_t k = 2; k < n; ++k) step_[k] = -slope_[k] - lower_[k] * step_[k - 1];
   step_[n - 1] /= pivot_[n - 1];
   for (std::size_t k = n - 1; k-- > 1;) step_[k] = step_[k] / pivot_[k] - lower_[k + 1] * step_[k + 1];
 }
@@ -531,6 +535,44 @@ double SpeedSolver::step_to_boundary() const {
   return longest;
 }
 
+double SpeedSolver::decrement() const {
+  double sum = 0;
+  for (std::size_t k = 1; k < grid_.cells(); ++k) sum -= gradient_[k] * step_[k];
+  return sum;
+}
+
+// Often a few bounds shorten the step of all cells. Those whose product s y a longer step would bring below a
+// share of mu aim at more, and the step is solved for again with the same matrix, as long as it then promises
+// a greater decrease (Gondzio, Comput. Optim. Appl. 6 (1996), sec. 3). Returns how long it can be.
+double SpeedSolver::centre(double mu) {
+  double longest = step_to_boundary(), promised = longest * decrement();
+  for (int round = 0; round < most_corrections && longest < long_enough; ++round) {
+    const double aim = std::min(1.0, 2 * longest + 0.1);
+    raised_.clear();
+    for (std::size_t k = 0; k < grid_.cells(); ++k) {
+      for (BoundState& b : bounds_of(k)) {
+        const double change = b.change(step_[k], step_[k + 1]), s = b.slack, y = b.multiplier;
+        const double moved = (s - aim * change) * (y * s + aim * (b.target + y * (change - s)));  // times s
+        if (moved >= least_product * mu * s) continue;
+        const double lacking = least_product * mu - moved / s;
+        b.target += lacking;
+        raised_.push_back({&b, lacking});
+        slope_[k] += lacking / s * b.by_z0, slope_[k + 1] += lacking / s * b.by_z1;
+      }
+    }
+    trial_ = step_;
+    solve_step();
+    const double length = step_to_boundary(), now = length * decrement();
+    if (!(now > promised)) {
+      step_ = trial_;
+      for (const auto& [bound, by] : raised_) bound->target -= by;
+      break;
+    }
+    longest = length, promised = now;
+  }
+  return longest;
+}
+
 // Backtracks until the barrier function falls enough; 0 when it does not. The accepted point is in trial_.
 double SpeedSolver::line_search(double longest, double decrement, double mu, double scale) {
   const double noise = 1e-13 * scale;
@@ -544,7 +586,7 @@ double SpeedSolver::line_search(double longest, double decrement, double mu, dou
 }
 
 // Multipliers and the kinks' slopes follow their linearised equations along the step.
-void SpeedSolver::update_duals(double mu) {
+void SpeedSolver::update_duals() {
   // Each multiplier keeps a share of itself: one that ends at zero does not shorten the others' steps.
   const auto follow = [](double& multiplier, double change) {
     multiplier = std::max((1 - to_boundary) * multiplier, multiplier + change);
@@ -556,7 +598,7 @@ void SpeedSolver::update_duals(double mu) {
     const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
     for (BoundState& b : bounds_of(k))
       follow(b.multiplier,
-             mu / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]));
+             b.target / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]));
     if (half_jump_ != 0) follow_kinks(c, dv, dq);
   }
 }
@@ -653,10 +695,8 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     barrier.follow(cost_here_);
     if (!regularise(damping, corrected)) break;
     solve_step();
-    double decrement = 0;
-    for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
     const double left = complementarity(), allowed = tolerance * barrier.scale();
-    if (barrier.at_finest() && left < 3 * allowed && decrement < 0.3 * allowed) {
+    if (barrier.at_finest() && left < 3 * allowed && decrement() < 0.3 * allowed) {
       solution.converged = true;
       solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
@@ -664,17 +704,18 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
       solution.convex = !scrubs_ && grid_.electric.down >= 0 && !corrected && damping == 0;
       break;
     }
-    const double length = line_search(step_to_boundary(), decrement, barrier.mu(), barrier.scale());
+    const double longest = centre(barrier.mu()), falls = decrement(),
+                 length = line_search(longest, falls, barrier.mu(), barrier.scale());
     if (length == 0) {
       if (damping > 1e6) break;
       damping = std::max(first_damping, 10 * damping);
       continue;
     }
-    update_duals(barrier.mu());
+    update_duals();
     std::swap(z_, trial_);
     if (length > 0.5) damping = damping > first_damping ? 0.1 * damping : 0;
     const double passed = barrier.gap();
-    if (!barrier.lower(decrement, length)) continue;
+    if (!barrier.lower(falls, length)) continue;
     way_.push_back({passed, z_});
     smooth();
   }

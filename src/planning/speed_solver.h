@@ -72,6 +72,7 @@ class SpeedSolver {
   // voltage.
   struct BoundState {
     double multiplier = 0, slack = 0, by_z0 = 0, by_z1 = 0;
+    double target = 0;  // that multiplier times slack is led to: mu or more
     unsigned index = 0;
 
     double change(double dz0, double dz1) const { return by_z0 * dz0 + by_z1 * dz1; }
@@ -124,8 +125,10 @@ class SpeedSolver {
   std::vector<double> cost_of_ends() const;
   double stationarity_residual() const;
   double step_to_boundary() const;
+  double decrement() const;
+  double centre(double mu);
   double line_search(double longest, double decrement, double mu, double scale);
-  void update_duals(double mu);
+  void update_duals();
   void follow_kinks(Cell& cell, double dv, double dq) const;
   std::array<bool, bound_count> binding(double unit_j) const;
 
@@ -137,6 +140,7 @@ class SpeedSolver {
   std::vector<std::uint32_t> bounds_;     // mask of bounds that can bind, per cell
   std::vector<std::size_t> first_bound_;  // of each cell in the following
   std::vector<BoundState> bound_states_;
+  std::vector<std::pair<BoundState*, double>> raised_;
   // Of the last solve: a profile for each barrier that was about solved, and its gap.
   struct Passed {
     double gap;
@@ -146,7 +150,7 @@ class SpeedSolver {
   double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
-  std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
+  std::vector<double> gradient_, slope_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
   bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
