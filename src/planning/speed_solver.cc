@@ -128,7 +128,18 @@ void SpeedSolver::set_return(double down) {
   half_jump_ = 0.5 * (grid_.electric.up - down);
 }
 
-SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
+inline SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
+  if (!w.quadratic()) return torque_in_full(w, v, q);
+  const double linear = w.t1 + w.f1, square = w.t2 + w.f2;
+  return {w.inertia * q + w.t0 + w.f0 + v * (linear + v * square),
+          linear + 2 * square * v,
+          w.inertia,
+          2 * square,
+          0,
+          0};
+}
+
+SpeedSolver::Torque SpeedSolver::torque_in_full(const WheelLoad& w, double v, double q) const {
   Torque r{};
   double way = 1, way_v = 0, way_vv = 0;  // of the wheel's direction
   if (w.creep != 0) {
@@ -184,9 +195,9 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
 // visit(index, g, g0, g1, g00, g01, g11) for each bound g <= 0 of the cell, with its derivatives by z0 and
 // z1.
 template <class Visit>
-void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const {
+void SpeedSolver::each_bound(std::size_t cell, const Node& first, const Node& last, Visit&& visit) const {
   const unsigned mask = bounds_[cell];
-  const double p = 0.5 / grid_.step[cell], q = (z1 - z0) * p;
+  const double p = 0.5 / grid_.step[cell], q = (last.z - first.z) * p;
   if (mask & bits(of_acceleration)) {
     const double a = 1 / grid_.acceleration_limit;
     visit(of_acceleration, q * a - 1, -p * a, p * a, 0.0, 0.0, 0.0);
@@ -194,14 +205,14 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
   }
   if (mask & bits(of_ceiling)) {
     const double a = 1 / grid_.ceiling[cell];
-    visit(of_ceiling, z0 * a - 1, a, 0.0, 0.0, 0.0, 0.0);
-    visit(of_floor, (floor_[cell] - z0) * a, -a, 0.0, 0.0, 0.0, 0.0);
+    visit(of_ceiling, first.z * a - 1, a, 0.0, 0.0, 0.0, 0.0);
+    visit(of_floor, (floor_[cell] - first.z) * a, -a, 0.0, 0.0, 0.0, 0.0);
   }
   if (!(mask >> of_motors)) return;
   for (const std::size_t end : {0u, 1u}) {
     if (!(mask >> bound_of(end, 0, false) & 0xffu)) continue;
-    const double z = end == 0 ? z0 : z1, v = std::sqrt(z);
-    const double vz = z > 0 ? 0.5 / v : 0, vzz = z > 0 ? -0.25 / (z * v) : 0;
+    const Node& node = end == 0 ? first : last;
+    const double v = node.v, vz = 0.5 * node.pace, vzz = -0.25 * node.pace * node.pace * node.pace;
     // a T + b v - 1, T of speed and acceleration.
     const auto bound = [&](unsigned j, double a, double b, const Torque& t) {
       const double by_v = a * t.tv + b, own = by_v * vz, by_q = a * t.tq * p;
@@ -233,28 +244,27 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
 }
 
 bool SpeedSolver::inside(const std::vector<double>& z) const {
-  for (std::size_t k = 0; k < grid_.cells(); ++k) {
-    bool ok = true;
-    each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) { ok = ok && g < 0; });
-    if (!ok) return false;
-  }
-  return true;
+  bool ok = true;
+  for (std::size_t k = 0; k < grid_.cells() && ok; ++k)
+    each_bound(k, Node(z[k]), Node(z[k + 1]), [&](unsigned, double g, auto...) { ok = ok && g < 0; });
+  return ok;
 }
 
 // Cost less mu times the logarithms of all slacks; infinite outside.
 double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
-  const std::size_t n = grid_.cells();
   double sum = 0;
   Logarithms logs;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double v = mean_speed(z[k], z[k + 1]), q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
+  Node first(z[0]);
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
+    const Node last(z[k + 1]);
     bool ok = true;
-    each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) {
+    each_bound(k, first, last, [&](unsigned, double g, auto...) {
       ok = ok && g < 0;
       if (ok) logs.add(-g);
     });
     if (!ok) return std::numeric_limits<double>::infinity();
-    sum += cost(k, v, q);
+    sum += cost(k, 0.5 * (first.v + last.v), (last.z - first.z) / (2 * grid_.step[k]));
+    first = last;
   }
   return sum - mu * logs.sum();
 }
@@ -273,14 +283,14 @@ void SpeedSolver::start_from(const std::vector<double>& z) {
 SpeedSolver::Local SpeedSolver::local(std::size_t k) {
   const Electric& e = grid_.electric;
   Cell& c = cells_[k];
-  const double v = c.v, q = c.q;
+  const double v = c.v, q = c.q, i = 1 / v;
   Local l;
-  l.f = idle_ / v, l.fv = -l.f / v, l.fvv = -2 * l.fv / v;
+  l.f = idle_ * i, l.fv = -l.f * i, l.fvv = -2 * l.fv * i;
   l.dual_v = l.fv;
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = grid_.load(k)[s];
     const Torque t = torque(w, v, q);
-    const double rho = e.copper_w_n2_m2[s], i = 1 / v;
+    const double rho = e.copper_w_n2_m2[s];
     double density = rho * t.t * i;                    // rho T/v
     double slope = 2 * density + e.back_emf * w.pace;  // d(energy)/dT
     double energy = (density + e.back_emf * w.pace) * t.t;
@@ -289,24 +299,25 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     double cross = -2 * density * i;       // d2/dT dv
     double direct_vv = 2 * density * t.t * i * i;
     if (e.brush_w_nm != 0) {
-      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t.t * t.t + width);
-      const double y = e.brush_w_nm * t.t * t.t / root;
-      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) / (root * root * root);
-      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) / (root * root * root * root * root);
+      const double width = e.brush_width_nm * e.brush_width_nm, r = 1 / std::sqrt(t.t * t.t + width);
+      const double y = e.brush_w_nm * t.t * t.t * r;
+      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) * (r * r * r);
+      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) * (r * r * r * r * r);
       energy += y * i, slope += y1 * i, bend += std::max(0.0, y2) * i;
       direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
     }
     const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
-    c.energy[s] = {energy, ev, eq};
+    c.energy[s] = {energy, ev, eq, 0};
     const double evv = direct_vv + 2 * cross * t.tv + bend * t.tv * t.tv + slope * t.tvv;
     const double evq = cross * t.tq + bend * t.tv * t.tq + slope * t.tvq;
     const double eqq = bend * t.tq * t.tq + slope * t.tqq;
     double first = mean_slope_, second = 0;
     if (half_jump_ != 0) {
-      const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
-      first += half_jump_ * energy / root;
-      second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy / root) / root;
-      l.f += half_jump_ * root;
+      const double square = energy * energy + smoothing_ * smoothing_, r = 1 / std::sqrt(square);
+      c.energy[s].steepness = r;
+      first += half_jump_ * energy * r;
+      second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy * r) * r;
+      l.f += half_jump_ * square * r;
     }
     l.f += mean_slope_ * energy;
     l.fv += first * ev, l.fq += first * eq;
@@ -330,15 +341,18 @@ void SpeedSolver::assemble(double mu) {
   std::fill(diagonal_.begin(), diagonal_.end(), 0.0);
   std::fill(off_.begin(), off_.end(), 0.0);
   std::fill(magnitude_.begin(), magnitude_.end(), 0.0);
+  Node first(z_[0]);
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
-    const double z0 = z_[k], z1 = z_[k + 1], r0 = std::sqrt(z0), r1 = std::sqrt(z1), h = grid_.step[k];
-    c.v = 0.5 * (r0 + r1), c.q = (z1 - z0) / (2 * h);
+    const Node last(z_[k + 1]);
+    const double h = grid_.step[k], p = 0.5 / h;
+    c.v = 0.5 * (first.v + last.v), c.q = (last.z - first.z) * p;
     Local l = local(k);
     l.fv *= h, l.fq *= h, l.fvv *= h, l.fvq *= h, l.fqq *= h;
     // From (v, q) to (z0, z1).
-    const double v0 = r0 > 0 ? 0.25 / r0 : 0, v1 = r1 > 0 ? 0.25 / r1 : 0;
-    const double v00 = r0 > 0 ? -0.125 / (z0 * r0) : 0, v11 = r1 > 0 ? -0.125 / (z1 * r1) : 0, p = 0.5 / h;
+    const double v0 = 0.25 * first.pace, v1 = 0.25 * last.pace, v00 = -0.5 * v0 * first.pace * first.pace,
+                 v11 = -0.5 * v1 * last.pace * last.pace;
+    c.by_z0 = v0, c.by_z1 = v1;
     cost_here_ += l.f * h;
     const double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
     gradient_[k] += l.fv * v0 - l.fq * p, gradient_[k + 1] += l.fv * v1 + l.fq * p;
@@ -348,20 +362,22 @@ void SpeedSolver::assemble(double mu) {
            d1 = l.fvv * v1 * v1 + 2 * mixed * v1 + l.fqq * p * p,
            d01 = l.fvv * v0 * v1 + mixed * (v0 - v1) - l.fqq * p * p;
     BoundState* state = bound_states_.data() + first_bound_[k];
-    each_bound(k, z0, z1,
+    each_bound(k, first, last,
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
-                 const double slack = -g, y = state->multiplier, weight = y / slack;
+                 const double slack = -g, y = state->multiplier, inverse = 1 / slack, weight = y * inverse,
+                              push = mu * inverse;
                  *state++ = {y, slack, g0, g1, mu, j};
                  logs.add(slack);
                  d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
                      d01 += weight * g0 * g1 + y * g01;
-                 gradient_[k] += mu / slack * g0, gradient_[k + 1] += mu / slack * g1;
+                 gradient_[k] += push * g0, gradient_[k + 1] += push * g1;
                  stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
                });
     diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
     off_[k] += d01;
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
         magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
+    first = last;
   }
   merit_here_ = cost_here_ - mu * logs.sum();
   slope_ = gradient_;
@@ -474,7 +490,8 @@ double SpeedSolver::BarrierSchedule::gear_width() const {
 void SpeedSolver::start_duals(double mu) {
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
     BoundState* state = bound_states_.data() + first_bound_[k];
-    each_bound(k, z_[k], z_[k + 1], [&](unsigned, double g, auto...) { state++->multiplier = mu / -g; });
+    each_bound(k, Node(z_[k]), Node(z_[k + 1]),
+               [&](unsigned, double g, auto...) { state++->multiplier = mu / -g; });
     cells_[k].kink = {0, 0};
   }
 }
@@ -593,12 +610,11 @@ void SpeedSolver::update_duals() {
   };
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
     Cell& c = cells_[k];
-    const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
-    const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
+    const double dv = c.by_z0 * step_[k] + c.by_z1 * step_[k + 1];
     const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
     for (BoundState& b : bounds_of(k))
       follow(b.multiplier,
-             b.target / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]));
+             (b.target + b.multiplier * b.change(step_[k], step_[k + 1])) / b.slack - b.multiplier);
     if (half_jump_ != 0) follow_kinks(c, dv, dq);
   }
 }
@@ -606,9 +622,8 @@ void SpeedSolver::update_duals() {
 void SpeedSolver::follow_kinks(Cell& c, double dv, double dq) const {
   for (std::size_t s : {0u, 1u}) {
     const Energy& e = c.energy[s];
-    const double root = std::sqrt(e.j * e.j + smoothing_ * smoothing_);
-    c.kink[s] =
-        std::clamp((e.j + (1 - c.kink[s] * e.j / root) * (e.by_v * dv + e.by_q * dq)) / root, -1.0, 1.0);
+    c.kink[s] = std::clamp(
+        (e.j + (1 - c.kink[s] * e.j * e.steepness) * (e.by_v * dv + e.by_q * dq)) * e.steepness, -1.0, 1.0);
   }
 }
 

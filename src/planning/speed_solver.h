@@ -62,10 +62,11 @@ class SpeedSolver {
   // A motor's energy over the way of a cell, and its derivatives.
   struct Energy {
     double j = 0, by_v = 0, by_q = 0;
+    double steepness = 0;  // of the smoothed kink: the inverse of its |j|
   };
   struct Cell {
-    double v = 0, q = 0;
-    std::array<double, 2> kink{};  // dual of phi's slope, in (-1, 1)
+    double v = 0, q = 0, by_z0 = 0, by_z1 = 0;  // by...: derivatives of v
+    std::array<double, 2> kink{};               // dual of phi's slope, in (-1, 1)
     std::array<Energy, 2> energy{};
   };
   // A bound of a cell: 2 of acceleration, 2 of the speed at its first node; at either end 4 of torque, 4 of
@@ -96,9 +97,14 @@ class SpeedSolver {
     double tolerance_, bounds_, scale_, length_ = 0, torque_nm_ = 0, mu_ = 0, finest_ = 0;
   };
 
+  struct Node {
+    explicit Node(double squared) : z(squared), v(std::sqrt(squared)), pace(squared > 0 ? 1 / v : 0) {}
+    double z, v, pace;  // the inverse of v, 0 at rest
+  };
   struct Torque {
     double t, tv, tq, tvv, tvq, tqq;
   };
+  Torque torque_in_full(const WheelLoad& w, double v, double q) const;
   Torque torque(const WheelLoad& w, double v, double q) const;
   double cost(std::size_t cell, double v, double q) const;
   std::span<BoundState> bounds_of(std::size_t cell) {
@@ -108,7 +114,7 @@ class SpeedSolver {
     return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
   }
   template <class Visit>
-  void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
+  void each_bound(std::size_t cell, const Node& first, const Node& last, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
   std::vector<double> initial_point(std::optional<double> share = {});
