@@ -544,8 +544,7 @@ double SpeedSolver::stationarity_residual() const {
 double SpeedSolver::step_to_boundary() const {
   double longest = 1;
   for (std::size_t k = 0; k < grid_.cells(); ++k)
-    for (const BoundState& b : bounds_of(k))
-      shorten(b.slack, -b.change(step_[k], step_[k + 1]), longest);
+    for (const BoundState& b : bounds_of(k)) shorten(b.slack, -b.change(step_[k], step_[k + 1]), longest);
   return longest;
 }
 
