@@ -34,7 +34,9 @@ namespace joulecast::planning {
 namespace {
 
 constexpr double to_boundary = 0.995;         // of a slack may be used up: tau of N&W (19.9)
-constexpr double linear_share = 0.9;          // of it where a bound bends; without, 7 % more steps
+constexpr double long_enough = 0.9;           // a step that is not corrected
+constexpr int most_corrections = 4;           // of a step; 6 and 10 take no fewer steps
+constexpr double least_product = 0.3;         // of s y over mu, after a step; 0.1 and 0.5 are like it
 constexpr double sufficient_decrease = 1e-4;  // c_1 of N&W (3.4)
 constexpr double first_correction = 1e-9;     // of the diagonal, W&B algorithm IC
 constexpr double correction_growth = 8;       // kappa_w+ of W&B algorithm IC
@@ -50,9 +52,15 @@ constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
 constexpr double quick_decrease = 0.05;   // after a full step with a decrement below the gap
 constexpr int most_iterations = 200;
 
+// Bounds of a cell: acceleration, positive and negative; ceiling and floor of its first node; of the motors.
+constexpr unsigned of_acceleration = 0, of_ceiling = 2, of_floor = 3, of_motors = 4;
+
 // The first of the two bounds, positive and negative, of a motor at an end of a cell.
 constexpr unsigned bound_of(std::size_t end, std::size_t side, bool voltage) {
-  return static_cast<unsigned>(2 + 8 * end + (voltage ? 4 : 0) + 2 * side);
+  return static_cast<unsigned>(of_motors + 8 * end + (voltage ? 4 : 0) + 2 * side);
+}
+constexpr std::uint32_t bits(unsigned two_from) {
+  return 3u << two_from;
 }
 constexpr std::uint32_t at_both_ends = 1u | 1u << (bound_of(1, 0, false) - bound_of(0, 0, false));
 
@@ -81,17 +89,16 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   assert(n >= 2 && grid_.ceiling.size() == n + 1);
   set_return(grid_.electric.down);
   cells_.resize(n);
-  for (auto* v : {&z_, &trial_, &ceiling_multiplier_, &floor_multiplier_, &gradient_, &stationarity_,
-                  &diagonal_, &off_, &magnitude_, &pivot_, &lower_, &step_}) {
+  for (auto* v : {&z_, &trial_, &gradient_, &slope_, &stationarity_, &diagonal_, &off_, &magnitude_, &pivot_,
+                  &lower_, &step_})
     v->assign(n + 1, 0);
-  }
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
   for (const WheelLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
   const std::vector<double> fastest = fastest_without_motors(grid_);
   for (std::size_t k = 0; k < n; ++k) {
-    std::uint32_t mask = 0;
-    if (std::isfinite(grid_.acceleration_limit)) mask = 3;
+    std::uint32_t mask = k > 0 ? bits(of_ceiling) : 0;
+    if (std::isfinite(grid_.acceleration_limit)) mask |= bits(of_acceleration);
     // A bound is left out where no speed and acceleration inside the others can reach it.
     const double v = std::sqrt(std::max(fastest[k], fastest[k + 1]));
     for (const std::size_t end : {0u, 1u}) {
@@ -104,11 +111,10 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
       }
     }
     bounds_[k] = mask;
-    bounds_motors_ = bounds_motors_ || mask > 3;
+    bounds_motors_ = bounds_motors_ || mask >> of_motors;
     first_bound_[k + 1] = first_bound_[k] + static_cast<std::size_t>(std::popcount(mask));
   }
   bound_states_.resize(first_bound_.back());
-  bound_total_ = 2 * (n - 1) + bound_states_.size();
 }
 
 const SpeedEnvelope& SpeedSolver::envelope() {
@@ -121,7 +127,18 @@ void SpeedSolver::set_return(double down) {
   half_jump_ = 0.5 * (grid_.electric.up - down);
 }
 
-SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
+inline SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
+  if (!w.quadratic()) return torque_in_full(w, v, q);
+  const double linear = w.t1 + w.f1, square = w.t2 + w.f2;
+  return {w.inertia * q + w.t0 + w.f0 + v * (linear + v * square),
+          linear + 2 * square * v,
+          w.inertia,
+          2 * square,
+          0,
+          0};
+}
+
+SpeedSolver::Torque SpeedSolver::torque_in_full(const WheelLoad& w, double v, double q) const {
   Torque r{};
   double way = 1, way_v = 0, way_vv = 0;  // of the wheel's direction
   if (w.creep != 0) {
@@ -177,19 +194,24 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
 // visit(index, g, g0, g1, g00, g01, g11) for each bound g <= 0 of the cell, with its derivatives by z0 and
 // z1.
 template <class Visit>
-void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const {
+void SpeedSolver::each_bound(std::size_t cell, const Node& first, const Node& last, Visit&& visit) const {
   const unsigned mask = bounds_[cell];
-  const double p = 0.5 / grid_.step[cell], q = (z1 - z0) * p;
-  if (mask & 3u) {
+  const double p = 0.5 / grid_.step[cell], q = (last.z - first.z) * p;
+  if (mask & bits(of_acceleration)) {
     const double a = 1 / grid_.acceleration_limit;
-    visit(0u, q * a - 1, -p * a, p * a, 0.0, 0.0, 0.0);
-    visit(1u, -q * a - 1, p * a, -p * a, 0.0, 0.0, 0.0);
+    visit(of_acceleration, q * a - 1, -p * a, p * a, 0.0, 0.0, 0.0);
+    visit(of_acceleration + 1, -q * a - 1, p * a, -p * a, 0.0, 0.0, 0.0);
   }
-  if (mask < 4u) return;
+  if (mask & bits(of_ceiling)) {
+    const double a = 1 / grid_.ceiling[cell];
+    visit(of_ceiling, first.z * a - 1, a, 0.0, 0.0, 0.0, 0.0);
+    visit(of_floor, (floor_[cell] - first.z) * a, -a, 0.0, 0.0, 0.0, 0.0);
+  }
+  if (!(mask >> of_motors)) return;
   for (const std::size_t end : {0u, 1u}) {
     if (!(mask >> bound_of(end, 0, false) & 0xffu)) continue;
-    const double z = end == 0 ? z0 : z1, v = std::sqrt(z);
-    const double vz = z > 0 ? 0.5 / v : 0, vzz = z > 0 ? -0.25 / (z * v) : 0;
+    const Node& node = end == 0 ? first : last;
+    const double v = node.v, vz = 0.5 * node.pace, vzz = -0.25 * node.pace * node.pace * node.pace;
     // a T + b v - 1, T of speed and acceleration.
     const auto bound = [&](unsigned j, double a, double b, const Torque& t) {
       const double by_v = a * t.tv + b, own = by_v * vz, by_q = a * t.tq * p;
@@ -203,7 +225,7 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
     };
     for (const std::size_t s : {0u, 1u}) {
       const unsigned of_torque = bound_of(end, s, false), of_voltage = bound_of(end, s, true);
-      if (!(mask & (3u << of_torque | 3u << of_voltage))) continue;
+      if (!(mask & (bits(of_torque) | bits(of_voltage)))) continue;
       const WheelLoad& w = grid_.load(cell, end)[s];
       const Torque creeping = torque(w, v, q), rolling = w.creep != 0 ? torque(w.rolling(), v, q) : creeping;
       const Electric& e = grid_.electric;
@@ -221,37 +243,27 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
 }
 
 bool SpeedSolver::inside(const std::vector<double>& z) const {
-  const std::size_t n = grid_.cells();
-  for (std::size_t k = 1; k < n; ++k) {
-    if (!(z[k] > floor_[k] && z[k] < grid_.ceiling[k])) return false;
-  }
-  for (std::size_t k = 0; k < n; ++k) {
-    bool ok = true;
-    each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) { ok = ok && g < 0; });
-    if (!ok) return false;
-  }
-  return true;
+  bool ok = true;
+  for (std::size_t k = 0; k < grid_.cells() && ok; ++k)
+    each_bound(k, Node(z[k]), Node(z[k + 1]), [&](unsigned, double g, auto...) { ok = ok && g < 0; });
+  return ok;
 }
 
 // Cost less mu times the logarithms of all slacks; infinite outside.
 double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
-  const std::size_t n = grid_.cells();
   double sum = 0;
   Logarithms logs;
-  for (std::size_t k = 0; k < n; ++k) {
-    const double v = mean_speed(z[k], z[k + 1]), q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
+  Node first(z[0]);
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
+    const Node last(z[k + 1]);
     bool ok = true;
-    each_bound(k, z[k], z[k + 1], [&](unsigned, double g, auto...) {
+    each_bound(k, first, last, [&](unsigned, double g, auto...) {
       ok = ok && g < 0;
       if (ok) logs.add(-g);
     });
-    if (k > 0) {
-      const double room = 1 - z[k] / grid_.ceiling[k];
-      ok = ok && room > 0 && z[k] > floor_[k];
-      if (ok) logs.add(room), logs.add((z[k] - floor_[k]) / grid_.ceiling[k]);
-    }
     if (!ok) return std::numeric_limits<double>::infinity();
-    sum += cost(k, v, q);
+    sum += cost(k, 0.5 * (first.v + last.v), (last.z - first.z) / (2 * grid_.step[k]));
+    first = last;
   }
   return sum - mu * logs.sum();
 }
@@ -270,14 +282,14 @@ void SpeedSolver::start_from(const std::vector<double>& z) {
 SpeedSolver::Local SpeedSolver::local(std::size_t k) {
   const Electric& e = grid_.electric;
   Cell& c = cells_[k];
-  const double v = c.v, q = c.q;
+  const double v = c.v, q = c.q, i = 1 / v;
   Local l;
-  l.f = idle_ / v, l.fv = -l.f / v, l.fvv = -2 * l.fv / v;
+  l.f = idle_ * i, l.fv = -l.f * i, l.fvv = -2 * l.fv * i;
   l.dual_v = l.fv;
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = grid_.load(k)[s];
     const Torque t = torque(w, v, q);
-    const double rho = e.copper_w_n2_m2[s], i = 1 / v;
+    const double rho = e.copper_w_n2_m2[s];
     double density = rho * t.t * i;                    // rho T/v
     double slope = 2 * density + e.back_emf * w.pace;  // d(energy)/dT
     double energy = (density + e.back_emf * w.pace) * t.t;
@@ -286,24 +298,25 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     double cross = -2 * density * i;       // d2/dT dv
     double direct_vv = 2 * density * t.t * i * i;
     if (e.brush_w_nm != 0) {
-      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t.t * t.t + width);
-      const double y = e.brush_w_nm * t.t * t.t / root;
-      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) / (root * root * root);
-      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) / (root * root * root * root * root);
+      const double width = e.brush_width_nm * e.brush_width_nm, r = 1 / std::sqrt(t.t * t.t + width);
+      const double y = e.brush_w_nm * t.t * t.t * r;
+      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) * (r * r * r);
+      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) * (r * r * r * r * r);
       energy += y * i, slope += y1 * i, bend += std::max(0.0, y2) * i;
       direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
     }
     const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
-    c.energy[s] = {energy, ev, eq};
+    c.energy[s] = {energy, ev, eq, 0};
     const double evv = direct_vv + 2 * cross * t.tv + bend * t.tv * t.tv + slope * t.tvv;
     const double evq = cross * t.tq + bend * t.tv * t.tq + slope * t.tvq;
     const double eqq = bend * t.tq * t.tq + slope * t.tqq;
     double first = mean_slope_, second = 0;
     if (half_jump_ != 0) {
-      const double root = std::sqrt(energy * energy + smoothing_ * smoothing_);
-      first += half_jump_ * energy / root;
-      second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy / root) / root;
-      l.f += half_jump_ * root;
+      const double square = energy * energy + smoothing_ * smoothing_, r = 1 / std::sqrt(square);
+      c.energy[s].steepness = r;
+      first += half_jump_ * energy * r;
+      second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy * r) * r;
+      l.f += half_jump_ * square * r;
     }
     l.f += mean_slope_ * energy;
     l.fv += first * ev, l.fq += first * eq;
@@ -327,15 +340,18 @@ void SpeedSolver::assemble(double mu) {
   std::fill(diagonal_.begin(), diagonal_.end(), 0.0);
   std::fill(off_.begin(), off_.end(), 0.0);
   std::fill(magnitude_.begin(), magnitude_.end(), 0.0);
+  Node first(z_[0]);
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
-    const double z0 = z_[k], z1 = z_[k + 1], r0 = std::sqrt(z0), r1 = std::sqrt(z1), h = grid_.step[k];
-    c.v = 0.5 * (r0 + r1), c.q = (z1 - z0) / (2 * h);
+    const Node last(z_[k + 1]);
+    const double h = grid_.step[k], p = 0.5 / h;
+    c.v = 0.5 * (first.v + last.v), c.q = (last.z - first.z) * p;
     Local l = local(k);
     l.fv *= h, l.fq *= h, l.fvv *= h, l.fvq *= h, l.fqq *= h;
     // From (v, q) to (z0, z1).
-    const double v0 = r0 > 0 ? 0.25 / r0 : 0, v1 = r1 > 0 ? 0.25 / r1 : 0;
-    const double v00 = r0 > 0 ? -0.125 / (z0 * r0) : 0, v11 = r1 > 0 ? -0.125 / (z1 * r1) : 0, p = 0.5 / h;
+    const double v0 = 0.25 * first.pace, v1 = 0.25 * last.pace, v00 = -0.5 * v0 * first.pace * first.pace,
+                 v11 = -0.5 * v1 * last.pace * last.pace;
+    c.by_z0 = v0, c.by_z1 = v1;
     cost_here_ += l.f * h;
     const double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
     gradient_[k] += l.fv * v0 - l.fq * p, gradient_[k + 1] += l.fv * v1 + l.fq * p;
@@ -345,29 +361,25 @@ void SpeedSolver::assemble(double mu) {
            d1 = l.fvv * v1 * v1 + 2 * mixed * v1 + l.fqq * p * p,
            d01 = l.fvv * v0 * v1 + mixed * (v0 - v1) - l.fqq * p * p;
     BoundState* state = bound_states_.data() + first_bound_[k];
-    each_bound(k, z0, z1,
+    each_bound(k, first, last,
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
-                 const double slack = -g, y = state->multiplier, weight = y / slack;
-                 *state++ = {y, slack, g0, g1, j};
+                 const double slack = -g, y = state->multiplier, inverse = 1 / slack, weight = y * inverse,
+                              push = mu * inverse;
+                 *state++ = {y, slack, g0, g1, mu, j};
                  logs.add(slack);
                  d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
                      d01 += weight * g0 * g1 + y * g01;
-                 gradient_[k] += mu / slack * g0, gradient_[k + 1] += mu / slack * g1;
+                 gradient_[k] += push * g0, gradient_[k + 1] += push * g1;
                  stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
                });
     diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
     off_[k] += d01;
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
         magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
-  }
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
-    logs.add(high), logs.add(low);
-    diagonal_[k] += a * a * (ceiling_multiplier_[k] / high + floor_multiplier_[k] / low);
-    gradient_[k] += mu * a * (1 / high - 1 / low);
-    stationarity_[k] += a * (ceiling_multiplier_[k] - floor_multiplier_[k]);
+    first = last;
   }
   merit_here_ = cost_here_ - mu * logs.sum();
+  slope_ = gradient_;
 }
 
 // LDL' of the tridiagonal matrix over the inner nodes; false when it is not positive definite.
@@ -386,8 +398,8 @@ bool SpeedSolver::factorise() {
 void SpeedSolver::solve_step() {
   const std::size_t n = grid_.cells();
   step_[0] = step_[n] = 0;
-  step_[1] = -gradient_[1];
-  for (std::size_t k = 2; k < n; ++k) step_[k] = -gradient_[k] - lower_[k] * step_[k - 1];
+  step_[1] = -slope_[1];
+  for (std::size_t k = 2; k < n; ++k) step_[k] = -slope_[k] - lower_[k] * step_[k - 1];
   step_[n - 1] /= pivot_[n - 1];
   for (std::size_t k = n - 1; k-- > 1;) step_[k] = step_[k] / pivot_[k] - lower_[k + 1] * step_[k + 1];
 }
@@ -475,15 +487,11 @@ double SpeedSolver::BarrierSchedule::gear_width() const {
 }
 
 void SpeedSolver::start_duals(double mu) {
-  const std::size_t n = grid_.cells();
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
     BoundState* state = bound_states_.data() + first_bound_[k];
-    each_bound(k, z_[k], z_[k + 1], [&](unsigned, double g, auto...) { state++->multiplier = mu / -g; });
+    each_bound(k, Node(z_[k]), Node(z_[k + 1]),
+               [&](unsigned, double g, auto...) { state++->multiplier = mu / -g; });
     cells_[k].kink = {0, 0};
-  }
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k];
-    ceiling_multiplier_[k] = mu / (1 - z_[k] * a), floor_multiplier_[k] = mu / ((z_[k] - floor_[k]) * a);
   }
 }
 
@@ -505,12 +513,7 @@ bool SpeedSolver::regularise(double damping, bool& corrected) {
 
 // Sum of multipliers times slacks.
 double SpeedSolver::complementarity() const {
-  const std::size_t n = grid_.cells();
   double gap = 0;
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k];
-    gap += ceiling_multiplier_[k] * (1 - z_[k] * a) + floor_multiplier_[k] * (z_[k] - floor_[k]) * a;
-  }
   for (const BoundState& b : bound_states_) gap += b.multiplier * b.slack;
   return gap;
 }
@@ -519,7 +522,7 @@ std::vector<double> SpeedSolver::cost_of_ends() const {
   if (!bounds_motors_) return {};
   std::vector<double> cost(grid_.cells(), 0);
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
-    const auto motors = bounds_of(k).subspan(bounds_[k] & 3u ? 2 : 0);
+    const auto motors = bounds_of(k).last(static_cast<std::size_t>(std::popcount(bounds_[k] >> of_motors)));
     for (std::size_t i = 0; i < motors.size() / 2; ++i) {
       const BoundState &near = motors[i], &far = motors[i + motors.size() / 2];
       const BoundState& fuller = near.slack < far.slack ? near : far;
@@ -537,19 +540,49 @@ double SpeedSolver::stationarity_residual() const {
   return worst;
 }
 
-// Longest step that keeps a share of every bound's slack, the motors' linearised.
+// Longest step that keeps a share of every bound's slack, linearised.
 double SpeedSolver::step_to_boundary() const {
-  const std::size_t n = grid_.cells();
   double longest = 1;
-  for (std::size_t k = 1; k < n; ++k) {
-    shorten(z_[k] - floor_[k], step_[k], longest);
-    shorten(grid_.ceiling[k] - z_[k], -step_[k], longest);
-  }
-  for (std::size_t k = 0; k < n; ++k)
-    for (const BoundState& b : bounds_of(k)) {
-      const double room = b.index < 2 ? b.slack : linear_share * b.slack;
-      shorten(room, -b.change(step_[k], step_[k + 1]), longest);
+  for (std::size_t k = 0; k < grid_.cells(); ++k)
+    for (const BoundState& b : bounds_of(k)) shorten(b.slack, -b.change(step_[k], step_[k + 1]), longest);
+  return longest;
+}
+
+double SpeedSolver::decrement() const {
+  double sum = 0;
+  for (std::size_t k = 1; k < grid_.cells(); ++k) sum -= gradient_[k] * step_[k];
+  return sum;
+}
+
+// Often a few bounds shorten the step of all cells. Those whose product s y a longer step would bring below a
+// share of mu aim at more, and the step is solved for again with the same matrix, as long as it then promises
+// a greater decrease (Gondzio, Comput. Optim. Appl. 6 (1996), sec. 3). Returns how long it can be.
+double SpeedSolver::centre(double mu) {
+  double longest = step_to_boundary(), promised = longest * decrement();
+  for (int round = 0; round < most_corrections && longest < long_enough; ++round) {
+    const double aim = std::min(1.0, 2 * longest + 0.1);
+    raised_.clear();
+    for (std::size_t k = 0; k < grid_.cells(); ++k) {
+      for (BoundState& b : bounds_of(k)) {
+        const double change = b.change(step_[k], step_[k + 1]), s = b.slack, y = b.multiplier;
+        const double moved = (s - aim * change) * (y * s + aim * (b.target + y * (change - s)));  // times s
+        if (moved >= least_product * mu * s) continue;
+        const double lacking = least_product * mu - moved / s;
+        b.target += lacking;
+        raised_.push_back({&b, lacking});
+        slope_[k] += lacking / s * b.by_z0, slope_[k + 1] += lacking / s * b.by_z1;
+      }
     }
+    trial_ = step_;
+    solve_step();
+    const double length = step_to_boundary(), now = length * decrement();
+    if (!(now > promised)) {
+      step_ = trial_;
+      for (const auto& [bound, by] : raised_) bound->target -= by;
+      break;
+    }
+    longest = length, promised = now;
+  }
   return longest;
 }
 
@@ -566,53 +599,40 @@ double SpeedSolver::line_search(double longest, double decrement, double mu, dou
 }
 
 // Multipliers and the kinks' slopes follow their linearised equations along the step.
-void SpeedSolver::update_duals(double mu) {
-  const std::size_t n = grid_.cells();
+void SpeedSolver::update_duals() {
   // Each multiplier keeps a share of itself: one that ends at zero does not shorten the others' steps.
   const auto follow = [](double& multiplier, double change) {
     multiplier = std::max((1 - to_boundary) * multiplier, multiplier + change);
   };
-  for (std::size_t k = 0; k < n; ++k) {
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
     Cell& c = cells_[k];
-    const double r0 = std::sqrt(z_[k]), r1 = std::sqrt(z_[k + 1]);
-    const double dv = (r0 > 0 ? 0.25 / r0 * step_[k] : 0) + (r1 > 0 ? 0.25 / r1 * step_[k + 1] : 0);
+    const double dv = c.by_z0 * step_[k] + c.by_z1 * step_[k + 1];
     const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
     for (BoundState& b : bounds_of(k))
       follow(b.multiplier,
-             mu / b.slack - b.multiplier + b.multiplier / b.slack * b.change(step_[k], step_[k + 1]));
+             (b.target + b.multiplier * b.change(step_[k], step_[k + 1])) / b.slack - b.multiplier);
     if (half_jump_ != 0) follow_kinks(c, dv, dq);
-  }
-  for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k], d = step_[k] * a;
-    const double high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
-    double &up = ceiling_multiplier_[k], &down = floor_multiplier_[k];
-    follow(up, mu / high - up + up / high * d);
-    follow(down, mu / low - down - down / low * d);
   }
 }
 
 void SpeedSolver::follow_kinks(Cell& c, double dv, double dq) const {
   for (std::size_t s : {0u, 1u}) {
     const Energy& e = c.energy[s];
-    const double root = std::sqrt(e.j * e.j + smoothing_ * smoothing_);
-    c.kink[s] =
-        std::clamp((e.j + (1 - c.kink[s] * e.j / root) * (e.by_v * dv + e.by_q * dq)) / root, -1.0, 1.0);
+    c.kink[s] = std::clamp(
+        (e.j + (1 - c.kink[s] * e.j * e.steepness) * (e.by_v * dv + e.by_q * dq)) * e.steepness, -1.0, 1.0);
   }
 }
 
 // A bound binds where its multiplier outweighs its slack; `unit_j` is the scale of multipliers.
 std::array<bool, bound_count> SpeedSolver::binding(double unit_j) const {
   std::array<bool, bound_count> binding{};
-  const auto binds = [&](double multiplier, double slack, Bound b) {
-    if (slack <= 1e-3 && multiplier * 1e-3 > slack * unit_j) binding[static_cast<std::size_t>(b)] = true;
-  };
-  for (std::size_t k = 0; k < grid_.cells(); ++k) {
-    for (const BoundState& b : bounds_of(k))
-      binds(b.multiplier, b.slack,
-            b.index < 2             ? Bound::acceleration
-            : (b.index - 2) % 8 < 4 ? Bound::current
-                                    : Bound::voltage);
-    if (k > 0) binds(ceiling_multiplier_[k], 1 - z_[k] / grid_.ceiling[k], Bound::speed);
+  for (const BoundState& b : bound_states_) {
+    if (b.index == of_floor || b.slack > 1e-3 || b.multiplier * 1e-3 <= b.slack * unit_j) continue;
+    const Bound bound = b.index < of_ceiling            ? Bound::acceleration
+                        : b.index == of_ceiling         ? Bound::speed
+                        : (b.index - of_motors) % 8 < 4 ? Bound::current
+                                                        : Bound::voltage;
+    binding[static_cast<std::size_t>(bound)] = true;
   }
   return binding;
 }
@@ -672,7 +692,8 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
   last_idle_ = idle_;
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
-  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, gap);
+  BarrierSchedule barrier(grid_, static_cast<double>(bound_states_.size()), std::fabs(merit(z_, 0)),
+                          tolerance, gap);
   const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
   smooth();
   start_duals(barrier.mu());
@@ -685,10 +706,8 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     barrier.follow(cost_here_);
     if (!regularise(damping, corrected)) break;
     solve_step();
-    double decrement = 0;
-    for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
     const double left = complementarity(), allowed = tolerance * barrier.scale();
-    if (barrier.at_finest() && left < 3 * allowed && decrement < 0.3 * allowed) {
+    if (barrier.at_finest() && left < 3 * allowed && decrement() < 0.3 * allowed) {
       solution.converged = true;
       solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
@@ -696,22 +715,23 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
       solution.convex = !scrubs_ && grid_.electric.down >= 0 && !corrected && damping == 0;
       break;
     }
-    const double length = line_search(step_to_boundary(), decrement, barrier.mu(), barrier.scale());
+    const double longest = centre(barrier.mu()), falls = decrement(),
+                 length = line_search(longest, falls, barrier.mu(), barrier.scale());
     if (length == 0) {
       if (damping > 1e6) break;
       damping = std::max(first_damping, 10 * damping);
       continue;
     }
-    update_duals(barrier.mu());
+    update_duals();
     std::swap(z_, trial_);
     if (length > 0.5) damping = damping > first_damping ? 0.1 * damping : 0;
     const double passed = barrier.gap();
-    if (!barrier.lower(decrement, length)) continue;
+    if (!barrier.lower(falls, length)) continue;
     way_.push_back({passed, z_});
     smooth();
   }
   if (!solution.converged) way_.clear();
-  solution.binding = binding(barrier.scale() / static_cast<double>(bound_total_));
+  solution.binding = binding(barrier.scale() / static_cast<double>(bound_states_.size()));
   finish(solution, price_w);
   return solution;
 }

@@ -62,15 +62,18 @@ class SpeedSolver {
   // A motor's energy over the way of a cell, and its derivatives.
   struct Energy {
     double j = 0, by_v = 0, by_q = 0;
+    double steepness = 0;  // of the smoothed kink: the inverse of its |j|
   };
   struct Cell {
-    double v = 0, q = 0;
-    std::array<double, 2> kink{};  // dual of phi's slope, in (-1, 1)
+    double v = 0, q = 0, by_z0 = 0, by_z1 = 0;  // by...: derivatives of v
+    std::array<double, 2> kink{};               // dual of phi's slope, in (-1, 1)
     std::array<Energy, 2> energy{};
   };
-  // A bound of a cell: 2 of acceleration; at either end 4 of torque, 4 of voltage.
+  // A bound of a cell: 2 of acceleration, 2 of the speed at its first node; at either end 4 of torque, 4 of
+  // voltage.
   struct BoundState {
     double multiplier = 0, slack = 0, by_z0 = 0, by_z1 = 0;
+    double target = 0;  // that multiplier times slack is led to: mu or more
     unsigned index = 0;
 
     double change(double dz0, double dz1) const { return by_z0 * dz0 + by_z1 * dz1; }
@@ -94,9 +97,14 @@ class SpeedSolver {
     double tolerance_, bounds_, scale_, length_ = 0, torque_nm_ = 0, mu_ = 0, finest_ = 0;
   };
 
+  struct Node {
+    explicit Node(double squared) : z(squared), v(std::sqrt(squared)), pace(squared > 0 ? 1 / v : 0) {}
+    double z, v, pace;  // the inverse of v, 0 at rest
+  };
   struct Torque {
     double t, tv, tq, tvv, tvq, tqq;
   };
+  Torque torque_in_full(const WheelLoad& w, double v, double q) const;
   Torque torque(const WheelLoad& w, double v, double q) const;
   double cost(std::size_t cell, double v, double q) const;
   std::span<BoundState> bounds_of(std::size_t cell) {
@@ -106,7 +114,7 @@ class SpeedSolver {
     return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
   }
   template <class Visit>
-  void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
+  void each_bound(std::size_t cell, const Node& first, const Node& last, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
   std::vector<double> initial_point(std::optional<double> share = {});
@@ -123,8 +131,10 @@ class SpeedSolver {
   std::vector<double> cost_of_ends() const;
   double stationarity_residual() const;
   double step_to_boundary() const;
+  double decrement() const;
+  double centre(double mu);
   double line_search(double longest, double decrement, double mu, double scale);
-  void update_duals(double mu);
+  void update_duals();
   void follow_kinks(Cell& cell, double dv, double dq) const;
   std::array<bool, bound_count> binding(double unit_j) const;
 
@@ -136,7 +146,7 @@ class SpeedSolver {
   std::vector<std::uint32_t> bounds_;     // mask of bounds that can bind, per cell
   std::vector<std::size_t> first_bound_;  // of each cell in the following
   std::vector<BoundState> bound_states_;
-  std::size_t bound_total_ = 0;
+  std::vector<std::pair<BoundState*, double>> raised_;
   // Of the last solve: a profile for each barrier that was about solved, and its gap.
   struct Passed {
     double gap;
@@ -146,8 +156,7 @@ class SpeedSolver {
   double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
-  std::vector<double> ceiling_multiplier_, floor_multiplier_;
-  std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
+  std::vector<double> gradient_, slope_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
   bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
