@@ -139,8 +139,8 @@ SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) 
   r.tq = w.inertia;
   r.tvv = tvv + 2 * w.f2 + w.f_dry * way_vv;
   if (w.gear != 0) {
-    const double root = std::sqrt(through * through + gear_smoothing_ * gear_smoothing_);
-    const double slope = through / root, bend = gear_smoothing_ * gear_smoothing_ / (root * root * root);
+    const double root = std::sqrt(through * through + torque_smoothing_ * torque_smoothing_);
+    const double slope = through / root, bend = torque_smoothing_ * torque_smoothing_ / (root * root * root);
     r.t += w.gear * way * root;
     r.tv += w.gear * (way * slope * tv + way_v * root);
     r.tq += w.gear * way * slope * w.inertia;
@@ -165,9 +165,7 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
     const WheelLoad& w = grid_.load(cell)[s];
     const Torque t = torque(w, v, q);
     double energy = (e.copper_w_n2_m2[s] * t.t / v + e.back_emf * w.pace) * t.t;
-    if (e.brush_w_nm != 0) {
-      energy += e.brush_w_nm * t.t * t.t / (v * std::sqrt(t.t * t.t + e.brush_width_nm * e.brush_width_nm));
-    }
+    if (e.brush_w_nm != 0) energy += e.brush_w_nm * std::hypot(t.t, torque_smoothing_) / v;
     f += mean_slope_ * energy;
     if (half_jump_ != 0) f += half_jump_ * std::sqrt(energy * energy + smoothing_ * smoothing_);
   }
@@ -286,11 +284,10 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     double cross = -2 * density * i;       // d2/dT dv
     double direct_vv = 2 * density * t.t * i * i;
     if (e.brush_w_nm != 0) {
-      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t.t * t.t + width);
-      const double y = e.brush_w_nm * t.t * t.t / root;
-      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) / (root * root * root);
-      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) / (root * root * root * root * root);
-      energy += y * i, slope += y1 * i, bend += std::max(0.0, y2) * i;
+      const double root = std::hypot(t.t, torque_smoothing_), y = e.brush_w_nm * root;
+      const double y1 = e.brush_w_nm * t.t / root, excess = y - y1 * t.t;
+      energy += y * i, slope += y1 * i, bend += excess / (root * root) * i;
+      kink_gap_ += grid_.step[k] * e.up * excess * i;
       direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
     }
     const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
@@ -470,7 +467,7 @@ double SpeedSolver::BarrierSchedule::kink_width() const {
   return std::max(finest, 0.3 * scale_ / length_ * std::sqrt(mu_ * bounds_ / scale_));
 }
 
-double SpeedSolver::BarrierSchedule::gear_width() const {
+double SpeedSolver::BarrierSchedule::torque_width() const {
   return std::max(1e-4, std::sqrt(mu_ * bounds_ / scale_)) * torque_nm_;
 }
 
@@ -666,14 +663,14 @@ void SpeedSolver::finish(SpeedSolution& solution, double price_w) {
 SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
                                    const std::stop_token& stop) {
   SpeedSolution solution;
-  smoothing_ = gear_smoothing_ = 0;
+  smoothing_ = torque_smoothing_ = 0;
   started_ = false;
   way_.clear();
   last_idle_ = idle_;
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
   BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, gap);
-  const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
+  const auto smooth = [&] { smoothing_ = barrier.kink_width(), torque_smoothing_ = barrier.torque_width(); };
   smooth();
   start_duals(barrier.mu());
   double damping = 0;
