@@ -87,7 +87,7 @@ class SpeedSolver {
     bool at_finest() const { return mu_ <= finest_; }
     void follow(double cost_j);
     bool lower(double decrement, double step_length);
-    double kink_width() const;  // of the energy over the way [J/x]
+    double kink_width() const;    // of the energy over the way [J/x]
     double torque_width() const;  // [N m]
 
    private:
