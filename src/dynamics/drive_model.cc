@@ -131,10 +131,11 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
     f.torque_nm[s] = b.total_nm[s];
     f.current_a[s] = current_for(b.total_nm[s]);
     f.voltage_v[s] = voltage_for(s, f.current_a[s], at);
-    f.motor_power_w[s] = f.voltage_v[s] * f.current_a[s];
+    const S brush = p.brush_drop_v * abs(f.current_a[s]);
+    f.motor_power_w[s] = (f.voltage_v[s] - brush_voltage(p, f.current_a[s])) * f.current_a[s] + brush;
 
     ledger[Term::copper] += resistance(s, at) * f.current_a[s] * f.current_a[s];
-    ledger[Term::brush] += brush_voltage(p, f.current_a[s]) * f.current_a[s];
+    ledger[Term::brush] += brush;
     // Field energy of the winding, and the difference by unequal SI values of K_t and K_w, are stored or lost
     // in the motor.
     ledger[Term::kinetic] += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];

@@ -17,7 +17,7 @@ struct PowerFlow {
   std::array<S, 2> torque_nm{};  // at the wheel, delivered by the motor
   std::array<S, 2> current_a{};
   std::array<S, 2> voltage_v{};
-  std::array<S, 2> motor_power_w{};  // V i, negative while braking regenerates
+  std::array<S, 2> motor_power_w{};  // negative while braking regenerates
   S battery_power_w = 0;             // at the battery terminals
   // Where it goes; adds up to battery_power_w. Without `sensor` and `unexplained`, which are not physical.
   signals::BasicLedger<S> ledger;

@@ -6,7 +6,8 @@
 
 namespace joulecast::dynamics {
 
-// Wheel speed below which dry friction fades [rad/s], and current below which the brush drop does [A].
+// Wheel speed below which dry friction fades [rad/s], and current below which the voltage of the brush drop
+// does [A]. Their power does not fade: it is continuous.
 inline constexpr double friction_width_rad_s = 0.005;
 inline constexpr double brush_width_a = 0.01;
 

@@ -40,7 +40,6 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
   e.voltage_constant_v_s_rad = p.voltage_constant_v_s_rad;
   e.back_emf = p.voltage_constant_v_s_rad / p.torque_constant_nm_a;
   e.brush_w_nm = p.brush_drop_v / p.torque_constant_nm_a;
-  e.brush_width_nm = dynamics::brush_width_a * p.torque_constant_nm_a;
   e.idle_w = p.idle_power_w + p.accessory_power_w;
   e.up = 1 + p.driver_loss;
   e.down = 1 - p.unreturned - p.driver_loss;

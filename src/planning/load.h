@@ -62,7 +62,6 @@ struct Electric {
   std::array<double, 2> copper_w_n2_m2{};
   double back_emf = 0;  // K_w/K_t
   double brush_w_nm = 0;
-  double brush_width_nm = 1;
   double idle_w = 0;
   double up = 1, down = 1;
   double torque_constant_nm_a = 0;

@@ -156,8 +156,8 @@ SpeedSolver::Torque SpeedSolver::torque_in_full(const WheelLoad& w, double v, do
   r.tq = w.inertia;
   r.tvv = tvv + 2 * w.f2 + w.f_dry * way_vv;
   if (w.gear != 0) {
-    const double root = std::sqrt(through * through + gear_smoothing_ * gear_smoothing_);
-    const double slope = through / root, bend = gear_smoothing_ * gear_smoothing_ / (root * root * root);
+    const double root = std::sqrt(through * through + torque_smoothing_ * torque_smoothing_);
+    const double slope = through / root, bend = torque_smoothing_ * torque_smoothing_ / (root * root * root);
     r.t += w.gear * way * root;
     r.tv += w.gear * (way * slope * tv + way_v * root);
     r.tq += w.gear * way * slope * w.inertia;
@@ -182,9 +182,7 @@ double SpeedSolver::cost(std::size_t cell, double v, double q) const {
     const WheelLoad& w = grid_.load(cell)[s];
     const Torque t = torque(w, v, q);
     double energy = (e.copper_w_n2_m2[s] * t.t / v + e.back_emf * w.pace) * t.t;
-    if (e.brush_w_nm != 0) {
-      energy += e.brush_w_nm * t.t * t.t / (v * std::sqrt(t.t * t.t + e.brush_width_nm * e.brush_width_nm));
-    }
+    if (e.brush_w_nm != 0) energy += e.brush_w_nm * std::hypot(t.t, torque_smoothing_) / v;
     f += mean_slope_ * energy;
     if (half_jump_ != 0) f += half_jump_ * std::sqrt(energy * energy + smoothing_ * smoothing_);
   }
@@ -298,11 +296,10 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     double cross = -2 * density * i;       // d2/dT dv
     double direct_vv = 2 * density * t.t * i * i;
     if (e.brush_w_nm != 0) {
-      const double width = e.brush_width_nm * e.brush_width_nm, r = 1 / std::sqrt(t.t * t.t + width);
-      const double y = e.brush_w_nm * t.t * t.t * r;
-      const double y1 = e.brush_w_nm * t.t * (t.t * t.t + 2 * width) * (r * r * r);
-      const double y2 = e.brush_w_nm * width * (2 * width - t.t * t.t) * (r * r * r * r * r);
-      energy += y * i, slope += y1 * i, bend += std::max(0.0, y2) * i;
+      const double root = std::sqrt(t.t * t.t + torque_smoothing_ * torque_smoothing_), y = e.brush_w_nm * root;
+      const double y1 = e.brush_w_nm * t.t / root, excess = y - y1 * t.t;
+      energy += y * i, slope += y1 * i, bend += excess / (root * root) * i;
+      kink_gap_ += grid_.step[k] * e.up * excess * i;
       direct_v -= y * i * i, cross -= y1 * i * i, direct_vv += 2 * y * i * i * i;
     }
     const double ev = direct_v + slope * t.tv, eq = slope * t.tq;
@@ -482,7 +479,7 @@ double SpeedSolver::BarrierSchedule::kink_width() const {
   return std::max(finest, 0.3 * scale_ / length_ * std::sqrt(mu_ * bounds_ / scale_));
 }
 
-double SpeedSolver::BarrierSchedule::gear_width() const {
+double SpeedSolver::BarrierSchedule::torque_width() const {
   return std::max(1e-4, std::sqrt(mu_ * bounds_ / scale_)) * torque_nm_;
 }
 
@@ -686,7 +683,7 @@ void SpeedSolver::finish(SpeedSolution& solution, double price_w) {
 SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
                                    const std::stop_token& stop) {
   SpeedSolution solution;
-  smoothing_ = gear_smoothing_ = 0;
+  smoothing_ = torque_smoothing_ = 0;
   started_ = false;
   way_.clear();
   last_idle_ = idle_;
@@ -694,7 +691,7 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
   if (!inside(z_)) return solution;
   BarrierSchedule barrier(grid_, static_cast<double>(bound_states_.size()), std::fabs(merit(z_, 0)),
                           tolerance, gap);
-  const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
+  const auto smooth = [&] { smoothing_ = barrier.kink_width(), torque_smoothing_ = barrier.torque_width(); };
   smooth();
   start_duals(barrier.mu());
   double damping = 0;

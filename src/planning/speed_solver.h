@@ -90,8 +90,8 @@ class SpeedSolver {
     bool at_finest() const { return mu_ <= finest_; }
     void follow(double cost_j);
     bool lower(double decrement, double step_length);
-    double kink_width() const;  // of the energy over the way [J/x]
-    double gear_width() const;  // [N m]
+    double kink_width() const;    // of the energy over the way [J/x]
+    double torque_width() const;  // [N m]
 
    private:
     double tolerance_, bounds_, scale_, length_ = 0, torque_nm_ = 0, mu_ = 0, finest_ = 0;
@@ -141,7 +141,7 @@ class SpeedSolver {
   const SpeedGrid grid_;
   std::optional<SpeedEnvelope> envelope_;  // once asked for
   std::vector<double> floor_;              // of z
-  double idle_ = 0, smoothing_ = 0, gear_smoothing_ = 0;
+  double idle_ = 0, smoothing_ = 0, torque_smoothing_ = 0;
   double mean_slope_ = 1, half_jump_ = 0;
   std::vector<std::uint32_t> bounds_;     // mask of bounds that can bind, per cell
   std::vector<std::size_t> first_bound_;  // of each cell in the following

@@ -76,11 +76,7 @@ UniformMotion::Power UniformMotion::motors(const Local& l, double acceleration) 
     const double t = l.torque[s] + w.inertia * acceleration;
     const double emf = e.back_emf * w.pace * l.v, copper = e.copper_w_n2_m2[s];
     double power = (copper * t + emf) * t, slope = 2 * copper * t + emf, bend = 2 * copper;
-    if (e.brush_w_nm != 0) {
-      const double width = e.brush_width_nm * e.brush_width_nm, root = std::sqrt(t * t + width);
-      power += e.brush_w_nm * t * t / root;
-      slope += e.brush_w_nm * t * (t * t + 2 * width) / (root * root * root);
-    }
+    power += e.brush_w_nm * std::fabs(t), slope += std::copysign(e.brush_w_nm, t);
     const double share = each_ * (power > 0 ? e.up : e.down);
     sum.w += share * power;
     sum.slope += share * slope * w.inertia;
@@ -162,7 +158,7 @@ double UniformMotion::level(const Local& l, double direction, double rate_w, dou
   };
   double low = 0, high = most, at_low = excess(0);
   at_low = std::min(at_low, -1e-14 * (std::fabs(here.w) + std::fabs(rate_w)));
-  if (task_.electric.up != task_.electric.down) {
+  if (task_.electric.up != task_.electric.down || task_.electric.brush_w_nm != 0) {
     // Where a motor begins to brake, the slope jumps; the optimum likes to be there, which is coasting.
     for (std::size_t s = 0; s < motors_; ++s) {
       const double kink = -l.torque[s] / (direction * task_.loads[s].inertia);

@@ -1,8 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <ctime>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <random>
 
 #include "answers/json/autonomy_json.h"
 #include "answers/json/matrix_json.h"
@@ -209,6 +214,102 @@ TEST_F(MatrixAnswer, UsualDrivingEqualsAutonomy) {
   request["driving"] = "usual";
   request["value_of_time_w"] = 3;
   EXPECT_EQ(error_of(request).field, "/value_of_time_w");
+}
+
+// The thesis's power (2-31), (2-32) over a trapezoid of 0.7 of the limits, the usual driving of a robot
+// without missions, whose centre of mass is on its axle.
+double usual_energy_j(const robot::RobotModel& r, double way, bool turns, double payload_kg,
+                      double& duration_s) {
+  const double radius = r.kinematics.wheel_radius_m, l = r.kinematics.half_track_m;
+  const double a = 0.7 * r.limits.acceleration_m_s2 / (turns ? l : 1);
+  const double top = 0.7 * (turns ? r.limits.yaw_rate_rad_s : r.limits.speed_m_s);
+  const double v = std::min(top, std::sqrt(way * a)), ramp = v / a, cruise = way / v - ramp;
+  duration_s += 2 * ramp + cruise;
+  const double mass = r.mass.chassis_kg + 2 * r.mass.wheel_kg + payload_kg;
+  const double yaw_inertia = r.mass.yaw_inertia_kg_m2 + 0.02 * payload_kg;
+  const double constant = r.motor.torque_constant_nm_a * r.motor.gear_ratio;
+  const double wheel = turns ? l / radius : 1 / radius;  // of the body's speed
+  const double inertia = (turns ? 0.5 * radius * yaw_inertia / l : 0.5 * radius * mass) +
+                         (r.mass.wheel_inertia_kg_m2 + r.motor.rotor_inertia_kg_m2) * wheel;
+  double energy = r.idle_power_w * (2 * ramp + cruise);
+  for (const double dry : r.motor.friction_torque_nm) {
+    const auto power = [&](double speed, double acceleration) {
+      const double w = wheel * speed;
+      const double torque = inertia * acceleration + r.motor.viscous_friction_nm_s_rad * w + dry;
+      return r.motor.resistance_ohm * torque * torque / (constant * constant) + w * torque;
+    };
+    // Simpson's rule is exact: power is a square of the speed.
+    for (const double slope : {a, -a})
+      energy += ramp / 6 * (power(0, slope) + 4 * power(0.5 * v, slope) + power(v, slope));
+    energy += cruise * power(v, 0);
+  }
+  return energy;
+}
+
+// A thousand robots by a thousand tasks of usual driving: no cell is missing, a hundred are compared, and the
+// answer's pieces are far from the time that one request may take.
+TEST_F(MatrixAnswer, UsualDrivingPricesAMillion) {
+  constexpr int size = 1000;
+  std::mt19937_64 random(36);
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
+  std::vector<std::array<double, 2>> starts(size), picks(size), drops(size);
+  std::vector<double> loads(size), headings(size);
+  json request = {{"robots", json::array()}, {"tasks", json::array()}, {"driving", "usual"}};
+  for (std::size_t k = 0; k < size; ++k) {
+    starts[k] = {between(0, 120), between(0, 80)}, headings[k] = between(-3, 3);
+    picks[k] = {between(0, 120), between(0, 80)}, drops[k] = {between(0, 120), between(0, 80)};
+    loads[k] = between(0, 10);
+    request["robots"].push_back(
+        {{"robot_id", "a"},
+         {"pose", {{"x_m", starts[k][0]}, {"y_m", starts[k][1]}, {"heading_rad", headings[k]}}}});
+    request["tasks"].push_back({{"task_id", std::to_string(k)},
+                                {"payload_kg", loads[k]},
+                                {"pickup", {{"x_m", picks[k][0]}, {"y_m", picks[k][1]}}},
+                                {"dropoff", {{"x_m", drops[k][0]}, {"y_m", drops[k][1]}}}});
+  }
+  // A robot of exactly its model, so that means are those of the model.
+  fleet_.outlook = [](std::shared_ptr<const ModelInForce> model) {
+    RobotOutlook outlook = untried(std::move(model));
+    forecast::Forecaster exact = *outlook.forecaster;
+    for (auto& track : exact.tracks) track.correction.covariance = {}, track.common = 0, track.scatter = {};
+    outlook.forecaster = std::make_shared<forecast::Forecaster>(std::move(exact));
+    return outlook;
+  };
+  MatrixText answer = text_of(request);
+  std::string text;
+  std::clock_t longest = 0, last = std::clock();
+  const std::clock_t begun = last;
+  while (answer.next(text, {})) longest = std::max(longest, std::clock() - last), last = std::clock();
+  const double usual_s = static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
+  EXPECT_LT(static_cast<double>(longest) / CLOCKS_PER_SEC, 0.1 * usual_s);
+  const json rows = json::parse(text)["rows"];
+  ASSERT_EQ(rows.size(), static_cast<std::size_t>(size));
+  std::size_t priced = 0;
+  for (const json& row : rows)
+    for (const json& energy : row["energy_j"]) priced += energy.is_number() && energy > 0;
+  EXPECT_EQ(priced, static_cast<std::size_t>(size) * size);
+
+  const robot::RobotModel& robot = models_.at("a")->robot;
+  const auto turned = [](double from, double to) {
+    return std::fabs(std::remainder(to - from, 2 * std::numbers::pi));
+  };
+  for (std::size_t k = 0; k < 100; ++k) {
+    const std::size_t r = random() % size, t = random() % size;
+    const auto leg = [](const auto& from, const auto& to) {
+      return std::pair{std::hypot(to[0] - from[0], to[1] - from[1]),
+                       std::atan2(to[1] - from[1], to[0] - from[0])};
+    };
+    const auto [empty_m, there] = leg(starts[r], picks[t]);
+    const auto [loaded_m, back] = leg(picks[t], drops[t]);
+    double duration = 0;
+    const double energy = usual_energy_j(robot, turned(headings[r], there), true, 0, duration) +
+                          usual_energy_j(robot, empty_m, false, 0, duration) +
+                          usual_energy_j(robot, turned(there, back), true, loads[t], duration) +
+                          usual_energy_j(robot, loaded_m, false, loads[t], duration);
+    // The model fades dry friction below 0.005 rad/s.
+    EXPECT_NEAR(rows[r]["energy_j"][t].get<double>(), energy, 1e-4 * energy) << r << " " << t;
+    EXPECT_NEAR(rows[r]["duration_s"][t].get<double>(), duration, 1e-3) << r << " " << t;
+  }
 }
 
 TEST_F(MatrixAnswer, StopsAfterTheClientLeft) {

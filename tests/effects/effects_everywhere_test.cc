@@ -264,9 +264,6 @@ void expect_planned(const robot::RobotModel& robot) {
       for (const double acceleration : {-0.3, 0.0, 0.3}) {
         const Instant at = loads->instant(run, knot, 0, speed, acceleration);
         const auto flow = loads->model().flow(at);
-        // |i| replaces the smooth sign of the brush drop; they differ within a few widths around zero
-        // current.
-        if (std::ranges::any_of(flow.current_a, [](double i) { return std::fabs(i) < 0.05; })) continue;
         EXPECT_NEAR(planned_power_w(loads->electric(), wheels, speed, acceleration), flow.battery_power_w,
                     1e-3 * std::fabs(flow.battery_power_w))
             << "turn " << run.turn << " speed " << speed << " acceleration " << acceleration;

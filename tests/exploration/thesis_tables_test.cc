@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -83,6 +86,41 @@ TEST_F(ThesisTables, ExplorationSavingsByReading) {
     EXPECT_GT(saving(2), 0.3);
     EXPECT_GT(saving(3), 0.58);
   }
+}
+
+// What the table states of the cases' order, from the printed values and from ours.
+TEST_F(ThesisTables, ExplorationCasesAreOrdered) {
+  const std::filesystem::path file = std::filesystem::path(JOULECAST_SHARED) / "seed/tables/table_5-4.csv";
+  JOULECAST_NEED_SHARED(std::filesystem::exists(file), "thesis's table 5-4");
+  std::ifstream stream(file);
+  std::string line;
+  std::getline(stream, line);
+  // By payload: the cases by their energy, dearest first.
+  std::map<double, std::map<double, int, std::greater<>>> triangles, optima, our_triangles, our_optima;
+  const Table table = table_5_4(robots_.nomad);
+  std::size_t row = 0;
+  for (double payload, triangle, optimal; std::getline(stream, line); row += 2) {
+    int number = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%d,%lf,%lf,%lf", &number, &payload, &triangle, &optimal), 4) << line;
+    ASSERT_TRUE(table.rows[row].what.starts_with("case " + std::to_string(number))) << table.rows[row].what;
+    triangles[payload][triangle] = number, optima[payload][optimal] = number;
+    our_triangles[payload][*table.rows[row].ours_j] = number;
+    our_optima[payload][*table.rows[row + 1].ours_j] = number;
+  }
+  ASSERT_EQ(triangles.size(), 3u);
+  const auto order = [](const auto& cases) {
+    std::string text;
+    for (const auto& [energy, number] : cases) text += std::to_string(number);
+    return text;
+  };
+  for (const auto& [payload, printed] : triangles) {
+    EXPECT_EQ(order(printed), "41235");
+    EXPECT_EQ(order(our_triangles[payload]), "41352");
+    EXPECT_EQ(order(optima[payload]).substr(0, 2), "14");
+    EXPECT_EQ(order(optima[payload]).back(), '5');
+    EXPECT_EQ(order(our_optima[payload]), "41352");
+  }
+  EXPECT_NE(table.assumptions.find("only that 4 and 1 are the dearest compares"), std::string::npos);
 }
 
 TEST_F(ThesisTables, EveryRowExplainsItsDifference) {

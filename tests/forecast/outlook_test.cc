@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include "battery/cell_shapes.h"
 #include "client/virtual_robot/rng.h"
@@ -136,6 +138,33 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
       {Motion::stand, 0, 0, {out.latest_departure->wait_s, standing_w * out.latest_departure->wait_s, 0, 0}});
   const Outlook waited = look_ahead(f, map, {0.5, 0, 0.15}, tasks, from_here, standing_w, 0.95);
   EXPECT_NEAR(waited.probability, 0.95, 0.01);
+}
+
+// Missions drawn from the scatter that the robot has, its scores with the t distribution of 5 degrees of
+// freedom of a robot without missions, return from the latest departure as often as asked.
+TEST(Outlook, LatestDeparturesReturnAsOften) {
+  constexpr double common = 0.06;
+  const Forecaster f = forecaster(common, 0);
+  const ChargeMap map = battery();
+  const double leg_j = 0.09 * map.energy_j(0.5, 0.15, 100), back_j = 0.5 * leg_j;
+  std::vector<PricedTask> tasks(14);
+  for (PricedTask& task : tasks) task.legs = {drive(leg_j)}, task.to_charger = {drive(back_j)};
+  for (const double confidence : {0.5, 0.8, 0.95}) {
+    const Outlook out =
+        look_ahead(f, map, {0.5, 0, 0.15}, tasks, std::vector{drive(back_j)}, standing_w, confidence);
+    ASSERT_TRUE(out.latest_departure);
+    const double driven_j = static_cast<double>(out.latest_departure->after_tasks) * leg_j + back_j,
+                 waited_j = standing_w * out.latest_departure->wait_s;
+    const double mean_w = (driven_j + waited_j) / (driven_j / 100 + out.latest_departure->wait_s);
+    const double usable_j = map.energy_j(0.5, 0.15, mean_w);
+    std::mt19937_64 random(36);
+    std::student_t_distribution<> score(5);
+    constexpr int draws = 20'000;
+    int returned = 0;
+    for (int k = 0; k < draws; ++k)
+      returned += driven_j * std::exp(common * std::sqrt(0.6) * score(random)) + waited_j <= usable_j;
+    EXPECT_NEAR(static_cast<double>(returned) / draws, confidence, 0.02);
+  }
 }
 
 TEST(Outlook, TooLateHasNoDeparture) {

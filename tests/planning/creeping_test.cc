@@ -1,5 +1,6 @@
 // Slow and short motions, in which the drive model fades dry friction below 0.005 rad/s: planner, estimate
 // and meter report the energy of friction that does not fade, less the closed form of what fading saves.
+// Motors of a few milliamperes, in which the brushes' drop of voltage fades, report all of its energy.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +23,8 @@ struct Reference {
   double faded_j = 0;   // saved where friction is T w / sqrt(w^2 + width^2), to first order of the width
 };
 
-Reference reference_of(const robot::RobotModel& r, double payload_kg, const Profile& rows) {
+Reference reference_of(const robot::RobotModel& r, double payload_kg, const Profile& rows,
+                       double brush_drop_v = 0) {
   constexpr double width = 0.005;
   const double radius = r.kinematics.wheel_radius_m, l = r.kinematics.half_track_m;
   const double mass = r.mass.chassis_kg + 2 * r.mass.wheel_kg + payload_kg;
@@ -45,7 +47,8 @@ Reference reference_of(const robot::RobotModel& r, double payload_kg, const Prof
                               (r.mass.wheel_inertia_kg_m2 + r.motor.rotor_inertia_kg_m2) * rate;
       const auto power = [&](double w) {
         const double torque = inertial + r.motor.viscous_friction_nm_s_rad * w + way * dry;
-        return r.motor.resistance_ohm * torque * torque / (constant * constant) + w * torque;
+        return r.motor.resistance_ohm * torque * torque / (constant * constant) + w * torque +
+               brush_drop_v * std::fabs(torque) / constant;
       };
       sum.energy_j += span / 6 * (power(w0) + 4 * power(0.5 * (w0 + w1)) + power(w1));
       // The integrals over the speed of 1 - s and 1 - s^2, s = w / sqrt(w^2 + width^2), are width and
@@ -116,6 +119,39 @@ TEST(Creeping, FrictionCountsFromStandstill) {
     EXPECT_NEAR(plan->summary.energy_j, faded, 3e-4 * faded);
     EXPECT_NEAR(estimate->battery_j, faded, 3e-4 * faded);
     EXPECT_NEAR(metered_j(heavy, creep.payload_kg, rows), faded, 1e-3 * faded);
+  }
+}
+
+TEST(SmallCurrents, LoseEnergyInTheBrushes) {
+  robot::RobotModel toy;
+  toy.robot_id = "toy";
+  toy.kinematics = {0.03, 0.05, 0};
+  toy.mass = {0.4, 0.015, 6e-4, 7e-6};
+  toy.motor = {8, 0, 0.02, 0.02, 50, 0, 1e-4, {0.005, 0.0055}};
+  toy.battery.nominal_voltage_v = 6;
+  toy.idle_power_w = 0.005;
+  toy.limits = {0.3, 0.2, 3, 0.5, 0.1};
+  constexpr double brush_drop_v = 1;
+  toy.effects = {{"brush_drop", {{"voltage_v", brush_drop_v}}}};
+  for (const std::vector<Segment>& segments :
+       {std::vector<Segment>{Straight{1.5}}, {TurnInPlace{2}}, {Straight{0.5}, Arc{0.3, 1.5}}}) {
+    const auto path = make_path(segments);
+    ASSERT_TRUE(path);
+    Problem problem;
+    problem.limits = limits_of(toy);
+    const auto plan = planning::plan(toy, *path, problem);
+    ASSERT_TRUE(plan) << describe(plan.error());
+    const Profile& rows = plan->profile;
+    const Reference reference = reference_of(toy, 0, rows, brush_drop_v);
+    std::vector<energy::MotionPoint> points;
+    for (std::size_t k = 0; k < rows.size(); ++k)
+      points.push_back({rows.time_s[k], rows.speed_m_s[k], rows.yaw_rate_rad_s[k]});
+    const auto estimate = energy::estimate_motion(*dynamics::drive_model(toy), points, 0);
+    ASSERT_TRUE(estimate) << describe(estimate.error());
+    const double faded = reference.energy_j - reference.faded_j;
+    EXPECT_NEAR(plan->summary.energy_j, faded, 3e-4 * faded);
+    EXPECT_NEAR(estimate->battery_j, faded, 3e-4 * faded);
+    EXPECT_NEAR(metered_j(toy, 0, rows), faded, 1e-3 * faded);
   }
 }
 

@@ -2,7 +2,10 @@
 // direct transcription.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "planning/peaks.h"
@@ -50,6 +53,96 @@ LimitedProblem limited_problem(std::uint64_t seed) {
                          : " straight") +
             " limit " + std::to_string(limit);
   return p;
+}
+
+// Steps of curvature on an incline, between segments of 0.4 m and more: half of the 0.2 m in which the
+// curvature then changes, as the HTTP document states, lies on each side of a joint.
+struct Joint {
+  double straight_m, radius_m, angle_rad;
+  double tilt_rad, uphill_rad;
+
+  std::array<double, 4> ways() const {  // where the curvature begins and ends to change
+    const double arc = radius_m * angle_rad;
+    return {straight_m - 0.1, straight_m + 0.1, straight_m + arc - 0.1, straight_m + arc + 0.1};
+  }
+  double slope(double way) const {
+    const auto w = ways();
+    return way > w[0] && way < w[1] ? 5 / radius_m : way > w[2] && way < w[3] ? -5 / radius_m : 0;
+  }
+  // Integrals of the slope: curvature and heading.
+  double bend(double way, int times) const {
+    double sum = 0;
+    const auto w = ways();
+    for (std::size_t k = 0; k < 4; ++k)
+      sum += (k == 0 || k == 3 ? 5 : -5) / radius_m * std::pow(std::max(0.0, way - w[k]), times) / times;
+    return sum;
+  }
+  double voltage(const robot::RobotModel& r, double payload_kg, double way, double v, double a) const {
+    const double radius = r.kinematics.wheel_radius_m, l = r.kinematics.half_track_m;
+    const double mass = r.mass.chassis_kg + 2 * r.mass.wheel_kg + payload_kg;
+    const double yaw_inertia = r.mass.yaw_inertia_kg_m2 + 0.02 * payload_kg;
+    const double constant = r.motor.torque_constant_nm_a * r.motor.gear_ratio;
+    const double curvature = bend(way, 1), yaw_slope = curvature * a + slope(way) * v * v;
+    const double force = mass * (a + 9.80665 * std::sin(tilt_rad) * std::cos(bend(way, 2) - uphill_rad));
+    double most = 0;
+    for (const std::size_t s : {0u, 1u}) {
+      const double sign = s == 0 ? 1 : -1;
+      const double w = v * (1 + sign * l * curvature) / radius;
+      const double torque =
+          0.5 * radius * (force + sign * yaw_inertia * yaw_slope / l) +
+          (r.mass.wheel_inertia_kg_m2 + r.motor.rotor_inertia_kg_m2) * (a + sign * l * yaw_slope) / radius +
+          r.motor.viscous_friction_nm_s_rad * w + std::copysign(r.motor.friction_torque_nm[s], w);
+      most = std::max(most, std::fabs(r.motor.resistance_ohm * torque / constant +
+                                      r.motor.voltage_constant_v_s_rad * r.motor.gear_ratio * w));
+    }
+    return most;
+  }
+};
+
+// Played with the speed linear in time between its rows, also at both sides of every joint.
+TEST(JointsOnSlopes, KeepTheirVoltageLimit) {
+  std::mt19937_64 random(36);
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
+  int bound = 0;
+  for (int k = 0; k < 60; ++k) {
+    robot::RobotModel robot = test::all_robots()[static_cast<std::size_t>(k % 4)];
+    const Joint joint{between(0.5, 4), between(0.5, 3), between(0.8, 2), between(0.01, 0.08), between(-3, 3)};
+    robot.effects.push_back({"slope", {{"angle_rad", joint.tilt_rad}, {"uphill_rad", joint.uphill_rad}}});
+    const double payload = between(0, robot.limits.payload_kg);
+    const auto path = make_path(
+        std::vector<Segment>{Straight{joint.straight_m}, Arc{joint.radius_m, joint.angle_rad}, Straight{2}},
+        PathOptions{.start = {}, .payload_kg = payload});
+    ASSERT_TRUE(path);
+    Problem problem;
+    problem.limits = limits_of(robot);
+    problem.limits.voltage_v *= between(0.35, 0.7);
+    problem.limits.current_a = std::numeric_limits<double>::infinity();
+    problem.value_of_time_w = k % 2 ? between(0, 300) : 0;
+    auto plan = planning::plan(robot, *path, problem);
+    if (!plan && plan.error().fault == Fault::infeasible) continue;
+    ASSERT_TRUE(plan) << describe(plan.error());
+    for (const bool hurried : {false, true}) {
+      if (hurried) {
+        problem.deadline_s = plan->certificate.shortest_time_s * 1.001;
+        plan = planning::plan(robot, *path, problem);
+        ASSERT_TRUE(plan) << describe(plan.error());
+      }
+      const Profile& rows = plan->profile;
+      double most = 0, where = 0;
+      for (std::size_t i = 0; i + 1 < rows.size(); ++i) {
+        const double span = rows.time_s[i + 1] - rows.time_s[i];
+        const double a = (rows.speed_m_s[i + 1] - rows.speed_m_s[i]) / span;
+        for (const double f : {1e-6, 0.25, 0.5, 0.75, 1 - 1e-6}) {
+          const double t = f * span, way = rows.distance_m[i] + (rows.speed_m_s[i] + 0.5 * a * t) * t;
+          const double volts = joint.voltage(robot, payload, way, rows.speed_m_s[i] + a * t, a);
+          if (volts > most) most = volts, where = way;
+        }
+      }
+      EXPECT_LT(most, problem.limits.voltage_v * (1 + 5e-5)) << k << " at " << where;
+      bound += most > 0.999 * problem.limits.voltage_v;
+    }
+  }
+  EXPECT_GT(bound, 20);
 }
 
 class LimitedProblems : public ::testing::TestWithParam<int> {};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "planning/planner.h"
 #include "tests/planning/oracle/random_question.h"
@@ -138,6 +139,60 @@ TEST_P(EffectsAgainstIpopt, PlansAreOptimalWithinLimits) {
   compare(*hurried);
 }
 
+// A robot of the same proportions in energy, as heavy as a toy or a carrier of 2 t, that begins at speed.
+test::Asked resized_question(std::uint64_t seed) {
+  test::Asked a = test::random_question(seed);
+  std::mt19937_64 random(seed * 2862933555777941757u + 36);
+  random.discard(8);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  const double mass = a.robot.total_mass_kg(0),
+               size = std::exp(between(std::log(0.4), std::log(2000))) / mass;
+  robot::RobotModel& r = a.robot;
+  for (double* by_mass :
+       {&r.mass.chassis_kg, &r.mass.wheel_kg, &r.mass.yaw_inertia_kg_m2, &r.mass.wheel_inertia_kg_m2,
+        &r.motor.rotor_inertia_kg_m2, &r.motor.viscous_friction_nm_s_rad, &r.motor.friction_torque_nm[0],
+        &r.motor.friction_torque_nm[1], &r.idle_power_w, &r.limits.payload_kg, &a.question.payload_kg,
+        &a.question.value_of_time_w, &a.problem.value_of_time_w})
+    *by_mass *= size;
+  for (double* by_root : {&r.motor.torque_constant_nm_a, &r.motor.voltage_constant_v_s_rad,
+                          &r.limits.current_a, &r.battery.nominal_voltage_v, &a.problem.limits.current_a,
+                          &a.problem.limits.voltage_v, &a.question.current_a, &a.question.voltage_v})
+    *by_root *= std::sqrt(size);
+  for (planning::Run& run : a.path.runs) run.payload_kg = a.question.payload_kg;
+  a.question.robot = r;
+  double bend = 0;
+  for (const double curvature : a.question.way.curvature_1_m) bend = std::max(bend, std::fabs(curvature));
+  const double fastest = std::min(a.question.speed_m_s, a.question.yaw_rate_rad_s / std::max(bend, 1e-9));
+  if (!a.question.way.turns_in_place)
+    a.question.start_speed = a.problem.start_speed_m_s = between(0, 0.95) * fastest;
+  a.label += " " + std::to_string(size * mass) + " kg at " + std::to_string(a.question.start_speed) + " m/s";
+  return a;
+}
+
+class AnySize : public ::testing::TestWithParam<int> {};
+
+TEST_P(AnySize, PlansFromSpeedAreOptimal) {
+  test::Asked asked = resized_question(static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(asked.label);
+  asked.question.cells = cells;
+  asked.question.strict = false;
+  const auto plan = planning::plan(asked.robot, asked.path, asked.problem);
+  if (!plan) {
+    // Too short to brake, or a start that the motors cannot keep, from which they could slow down.
+    EXPECT_EQ(plan.error().fault, Fault::infeasible) << describe(plan.error());
+    return;
+  }
+  const oracle::Found best = oracle::least_energy(asked.question);
+  EXPECT_LT(greatest_use(asked, plan->profile), 1 + 5e-5);
+  ASSERT_TRUE(best.solved);
+  const double cost = plan->summary.energy_j + asked.problem.value_of_time_w * plan->summary.duration_s;
+  // Energy that braking returns makes costs small beside what flows.
+  EXPECT_NEAR(cost, best.cost_j, 1e-3 * std::fabs(best.cost_j));
+  EXPECT_LT(cost - bounds_of(plan->certificate), best.cost_j + of_the_oracle * std::fabs(best.cost_j));
+}
+
 // The inner wheel of a clothoid reverses: its dry friction jumps, at a current limit just above it.
 TEST(ReversingWheel, KeepsItsCurrentLimit) {
   const test::Asked asked = test::random_effect_question(1038);
@@ -170,6 +225,8 @@ TEST(Detours, KeepTheirCurrentLimit) {
   EXPECT_LT(greatest_use(asked, hurried->profile), 1 + 2e-4);
 }
 
+INSTANTIATE_TEST_SUITE_P(EightProblems, AnySize, ::testing::Range(3000, 3008));
+INSTANTIATE_TEST_SUITE_P(LongRest, AnySize, ::testing::Range(3008, 3060));
 INSTANTIATE_TEST_SUITE_P(SixProblems, EffectsAgainstIpopt, ::testing::Range(1000, 1006));
 INSTANTIATE_TEST_SUITE_P(LongRest, EffectsAgainstIpopt, ::testing::Range(1006, 1040));
 INSTANTIATE_TEST_SUITE_P(ThreeGears, EffectsAgainstIpopt, ::testing::Range(2003, 2006));

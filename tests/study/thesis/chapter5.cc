@@ -138,9 +138,10 @@ Table table_5_4(const robot::RobotModel& nomad) {
           "(4-1): "
           "its friction costs any profile {:.2f} J/m, so that a triangle of 1 m/s and the optimum differ by "
           "60 % "
-          "only on legs below {:.2f} m, and its energy grows with payload while the printed one falls. Only "
+          "only on legs below {:.2f} m, and its energy grows with payload while the printed one falls. Of "
           "the "
-          "order of the cases compares",
+          "order of the cases, only that 4 and 1 are the dearest compares: the cheapest is printed as 5, "
+          "and is 2 here",
           friction_j_m, leg_that_saves(nomad, 0.6)),
       {}};
   exploration::Exploration fine, coarse;
