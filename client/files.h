@@ -15,6 +15,6 @@ namespace joulecast::client {
 inline Existing existing(bool force) {
   return force ? Existing::replace : Existing::refuse;
 }
-inline constexpr const char* force_help = "write over files that are there already";
+inline constexpr const char* force_help = "overwrite existing files";
 
 }  // namespace joulecast::client

@@ -110,7 +110,7 @@ void add_adopt(CLI::App& program, Exit& exit) {
                    named("EFFECT")},
                   {"--note", Text{"note"}, "reason, for the list of versions", named("WORDS")},
                   {"--force", &O::force, "adopt in spite of the back-test or the diagnosis"},
-                  {"--dry-run", &O::dry_run, "test only"},
+                  {"--dry-run", &O::dry_run, "run the back-test without adopting"},
                   json_row<O>()},
                  "joulecast adopt amr --server http://127.0.0.1:8080 --model amr.json --dry-run\n"
                  "joulecast adopt --server http://127.0.0.1:8080 --robot-id amr --version 1");

@@ -296,15 +296,16 @@ Row<AskOptions> driving_row(const char* help) {
 
 Rows common_rows(const char* robot_help) {
   using O = AskOptions;
-  return {{"--robot", &O::robot_file, "robot file: compute here, without a server", file_of("json")},
-          {"--server", &O::server, server_help, named("URL"), Excludes{"--robot"}},
-          {"robot,--robot-id", &O::robot_id, robot_help, named("ROBOT"), Needs{"--server"}},
-          {"--request", &O::request_file,
-           "request as JSON, as the service takes it (openapi.json), - for standard input; flags override it",
-           file_of("json")},
-          {"--timeout", &O::timeout_s, "seconds to wait for the server", positive()},
-          unit_row<O>(),
-          json_row<O>()};
+  return {
+      {"--robot", &O::robot_file, "robot file: compute here, without a server", file_of("json")},
+      {"--server", &O::server, server_help, named("URL"), Excludes{"--robot"}},
+      {"robot,--robot-id", &O::robot_id, robot_help, named("ROBOT"), Needs{"--server"}},
+      {"--request", &O::request_file,
+       "request as JSON, as the service accepts it (openapi.json), - for standard input; flags override it",
+       file_of("json")},
+      {"--timeout", &O::timeout_s, "seconds to wait for the server", positive()},
+      unit_row<O>(),
+      json_row<O>()};
 }
 
 Rows drive_rows() {
@@ -315,7 +316,7 @@ Rows drive_rows() {
         "draw speed, power and energy over time into this SVG, against the baselines", file_of("svg")},
        {"--force", &O::force, force_help},
        {"--turn", &O::turn_rad,
-        "turn in place by that angle (to the left), before --length: 1.57 (rad) or 90deg", angle_value()},
+        "turn in place by this angle (to the left), before --length: 1.57 (rad) or 90deg", angle_value()},
        {"--length", &O::length_m, "length of a straight drive, m"},
        {"--payload", Number{"payload_kg"}, "payload, kg"},
        {"--deadline", Number{"deadline_s"}, "latest arrival, s after the start"},
@@ -336,10 +337,9 @@ void need_robot(CLI::App& command) {
 void add_profile(CLI::App& program, Exit& exit) {
   auto* command = add_command<AskOptions>(
       program, exit, "profile", "Plan the minimum-energy motion along a path", run_drive_question<profile>,
-      with(
-          drive_rows(),
-          {{"--energy-budget", Number{"energy_budget_j"}, "the fastest motion within so many J"},
-           {"--pareto", Number{"pareto_points"}, "also so many points of the front of energy against time"}}),
+      with(drive_rows(),
+           {{"--energy-budget", Number{"energy_budget_j"}, "the fastest motion within this energy, in J"},
+            {"--pareto", Number{"pareto_points"}, "number of points on the front of energy against time"}}),
       "joulecast profile --robot amr.json --length 10 --payload 20\n"
       "joulecast profile --robot amr.json --length 10 --deadline 14 --json\n"
       "joulecast profile amr --server http://127.0.0.1:8080 --turn 90deg --length 10 --pareto 5");

@@ -327,7 +327,7 @@ void add_check(CLI::App& program, Exit& exit) {
       run_check,
       {{"file", &O::files,
         "robot files, import mappings, LCM event logs, or tables with --mapping; with --server, the robot; "
-        "none: a running robot",
+        "without a file, a running robot",
         file_of("json")},
        {"--robot", &O::robot, "robot file to compare recordings and running robots with", file_of("json")},
        {"--mapping", &O::mapping, "import mapping of tables: the meaning of their columns", file_of("json")},

@@ -105,7 +105,7 @@ void add_export(CLI::App& program, Exit& exit) {
       {server, robot, from, to, out, force},
       "joulecast export missions --server http://127.0.0.1:8080 --from 2026-11-21 --out missions.csv");
   add_command<O>(
-      group, exit, "floor", "Energy and gap by squares of the floor, over all missions", export_floor,
+      group, exit, "floor", "Energy and gap by floor square, over all missions", export_floor,
       {server,
        robot,
        from,

@@ -75,7 +75,7 @@ std::string HelpFormatter::make_description(const CLI::App* app) const {
 
 // A group of options of which exactly one is required.
 std::string HelpFormatter::make_expanded(const CLI::App* group) const {
-  std::string out = "\nOne of these:\n";
+  std::string out = "\nOne of these options:\n";
   for (const CLI::Option* option : group->get_options())
     if (option != group->get_help_ptr()) out += make_option(option, false);
   return out;

@@ -138,7 +138,7 @@ void add_matrix(CLI::App& program, Exit& exit) {
   auto* command = add_command<O>(
       program, exit, "matrix", "Compute the energy of every robot for every task", run_matrix,
       {{"request", &O::request_file,
-        "request as JSON, as the service takes it (openapi.json), - for standard input", file_of("json"),
+        "request as JSON, as the service accepts it (openapi.json), - for standard input", file_of("json"),
         required},
        {"--robot", &O::robot_files,
         "robot file, repeatable: compute here, without a server, for all of them if the request lists none",

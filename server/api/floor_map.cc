@@ -8,7 +8,7 @@
 #include "server/api/csv.h"
 #include "server/api/services.h"
 
-// Energy and gap by squares of the floor, over the missions of a period.
+// Energy and gap by floor square, over the missions of a period.
 namespace joulecast::api {
 namespace {
 
@@ -113,7 +113,7 @@ const Table<FloorAnswer>& floor_map_table() {
                                  .value("y_max_m", &B::y_max_m, "m, above all squares");
   using A = FloorAnswer;
   static const auto table =
-      Table<A>("Energy and gap by squares of the floor")
+      Table<A>("Energy and gap by floor square")
           .value("cell_m", AT(map.cell_m), "m, side of a square", {{"exclusiveMinimum", 0}})
           .value("missions", AT(map.reading.missions),
                  "missions that started in the period, without annulled and contradicted ones", at_least_0)
@@ -182,7 +182,7 @@ Result<Response> floor_map(const Services& services, const Request& request) {
 Part floor_map_part() {
   Rows rows;
   rows.add(Method::get, "/v1/floor-map", "mapFloor", http::Role::read,
-           "Energy and gap by squares of the floor, from the traces of missions, with zones of significant "
+           "Energy and gap by floor square, from the traces of missions, with zones of significant "
            "departure; of a history of more than a million seconds an evenly distributed sample of the "
            "missions is evaluated",
            "floor-map", floor_map,

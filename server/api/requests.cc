@@ -72,7 +72,7 @@ const Input<ModelRequest>& model_input() {
                    "adopt also if the diagnosis contains a reason against it or the back-test shows no "
                    "improvement",
                    false)
-          .boolean("dry_run", &ModelRequest::dry_run, "test only", false)
+          .boolean("dry_run", &ModelRequest::dry_run, "run the back-test without adopting", false)
           .check(check_model_request);
   return input;
 }

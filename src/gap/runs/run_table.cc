@@ -67,8 +67,7 @@ constexpr std::array<Column, place_count> run_table_columns{
 // All other columns are named by their kind and their name.
 constexpr std::array<RunColumn, 2> own_columns{
     {{"covariate:NAME", "any", "a number that may be a cause: computer load, temperature, ..."},
-     {"label:NAME", "",
-      "a word that may make a difference: surface, driver, ...; --compare-by NAME compares"}}};
+     {"label:NAME", "", "a category, such as surface or driver; --compare-by NAME compares"}}};
 constexpr std::string_view covariate_prefix = "covariate:", label_prefix = "label:";
 
 // The columns of a table by their place.

@@ -80,7 +80,7 @@ const Table<Figures>& figures_table() {
   static const auto table =
       Table<F>()
           .list("maps", &F::maps, "power in ranges of one variable", maps)
-          .object("floor", std::identity(), "the same in squares of the floor", floor)
+          .object("floor", std::identity(), "the same by floor square", floor)
           .object("power", std::identity(), "power over the 90 s with the largest gap", power)
           .object("missions", std::identity(), "the first 40 missions", missions);
   return table;
