@@ -87,7 +87,7 @@ inline constexpr double least_gap_share = 0.05, most_gap_share = 2;  // of the r
 inline constexpr double detected_sd = 3.5, detected_part = 0.9;      // of the effects
 inline constexpr double detectable = 0.04;                           // of the power: "none" needs this
 inline constexpr double mismatched_file = 0.3;  // of the power: residual of the file beyond the explanation
-inline constexpr double repeats_s = 2, repeats_left = 0.85, repeats_least = 0.04;
+inline constexpr double repeats_s = 2, repeats_left = 0.85;
 inline constexpr std::size_t time_missions = 2;  // functions of time
 inline constexpr double revisit_s = 20;          // functions of place
 

@@ -400,7 +400,7 @@ class Explainer {
   // A difference that a calibration removes, or that repeats, is a gap without a name.
   bool gap_is_left() const {
     const HeldOut& h = a_.held_out;
-    return h.known && (h.file - h.explanation > clear_gain || a_.repeats_file > repeats_least);
+    return h.known && (h.file - h.explanation > clear_gain || a_.repeats_file > detectable);
   }
 
   bool function_predicts() {
@@ -418,7 +418,7 @@ class Explainer {
   }
 
   bool more_repeats(double left) {
-    if (!(left > std::max(repeats_left * a_.repeats_file, repeats_least))) return false;
+    if (!(left > std::max(repeats_left * a_.repeats_file, detectable))) return false;
     a_.reasons.push_back(
         fmt::format("{:.1f} % of power that repeats remains of {:.1f} %: a larger cause is left", 100 * left,
                     100 * a_.repeats_file));
