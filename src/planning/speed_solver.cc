@@ -296,7 +296,8 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     double cross = -2 * density * i;       // d2/dT dv
     double direct_vv = 2 * density * t.t * i * i;
     if (e.brush_w_nm != 0) {
-      const double root = std::sqrt(t.t * t.t + torque_smoothing_ * torque_smoothing_), y = e.brush_w_nm * root;
+      const double root = std::sqrt(t.t * t.t + torque_smoothing_ * torque_smoothing_),
+                   y = e.brush_w_nm * root;
       const double y1 = e.brush_w_nm * t.t / root, excess = y - y1 * t.t;
       energy += y * i, slope += y1 * i, bend += excess / (root * root) * i;
       kink_gap_ += grid_.step[k] * e.up * excess * i;
