@@ -34,6 +34,7 @@ namespace joulecast::planning {
 namespace {
 
 constexpr double to_boundary = 0.995;         // of a slack may be used up: tau of N&W (19.9)
+constexpr double linear_share = 0.9;          // of it where a bound bends; without, 7 % more steps
 constexpr double long_enough = 0.9;           // a step that is not corrected
 constexpr int most_corrections = 4;           // of a step; 6 and 10 take no fewer steps
 constexpr double least_product = 0.3;         // of s y over mu, after a step; 0.1 and 0.5 are like it
@@ -538,11 +539,14 @@ double SpeedSolver::stationarity_residual() const {
   return worst;
 }
 
-// Longest step that keeps a share of every bound's slack, linearised.
+// Longest step that keeps a share of every bound's slack, the motors' linearised.
 double SpeedSolver::step_to_boundary() const {
   double longest = 1;
   for (std::size_t k = 0; k < grid_.cells(); ++k)
-    for (const BoundState& b : bounds_of(k)) shorten(b.slack, -b.change(step_[k], step_[k + 1]), longest);
+    for (const BoundState& b : bounds_of(k)) {
+      const double room = b.index < of_motors ? b.slack : linear_share * b.slack;
+      shorten(room, -b.change(step_[k], step_[k + 1]), longest);
+    }
   return longest;
 }
 
