@@ -100,10 +100,15 @@ S BasicDriveModel<S>::resistance(std::size_t side, const Instant& at) const {
 }
 
 template <class S>
-S BasicDriveModel<S>::voltage_for(std::size_t side, S current_a, const Instant& at) const {
+S BasicDriveModel<S>::winding_voltage(std::size_t side, S current_a, const Instant& at) const {
   const Parameters<S>& p = parameters_;
   return resistance(side, at) * current_a + p.inductance_h * at.current_slope_a_s[side] +
-         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side] + brush_voltage(p, current_a);
+         p.voltage_constant_v_s_rad * at.wheel_speed_rad_s[side];
+}
+
+template <class S>
+S BasicDriveModel<S>::voltage_for(std::size_t side, S current_a, const Instant& at) const {
+  return winding_voltage(side, current_a, at) + brush_voltage(parameters_, current_a);
 }
 
 template <class S>
@@ -130,9 +135,9 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
     const double speed = at.wheel_speed_rad_s[s];
     f.torque_nm[s] = b.total_nm[s];
     f.current_a[s] = current_for(b.total_nm[s]);
-    f.voltage_v[s] = voltage_for(s, f.current_a[s], at);
-    const S brush = p.brush_drop_v * abs(f.current_a[s]);
-    f.motor_power_w[s] = (f.voltage_v[s] - brush_voltage(p, f.current_a[s])) * f.current_a[s] + brush;
+    const S winding_v = winding_voltage(s, f.current_a[s], at), brush = p.brush_drop_v * abs(f.current_a[s]);
+    f.voltage_v[s] = winding_v + brush_voltage(p, f.current_a[s]);
+    f.motor_power_w[s] = winding_v * f.current_a[s] + brush;
 
     ledger[Term::copper] += resistance(s, at) * f.current_a[s] * f.current_a[s];
     ledger[Term::brush] += brush;

@@ -75,6 +75,7 @@ class BasicDriveModel {
  private:
   template <class Values>
   void apply(std::span<const ActiveEffect> effects, Values&& values_of);
+  S winding_voltage(std::size_t side, S current_a, const Instant& at) const;  // without the brushes
 
   Parameters<S> parameters_;
   struct LoadEffect {

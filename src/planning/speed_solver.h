@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "planning/load.h"
@@ -107,6 +109,9 @@ class SpeedSolver {
   Torque torque_in_full(const WheelLoad& w, double v, double q) const;
   Torque torque(const WheelLoad& w, double v, double q) const;
   double cost(std::size_t cell, double v, double q) const;
+  double smooth_size(double torque_nm) const {  // |torque|, smooth at zero
+    return std::sqrt(torque_nm * torque_nm + torque_smoothing_ * torque_smoothing_);
+  }
   std::span<BoundState> bounds_of(std::size_t cell) {
     return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
   }
