@@ -24,7 +24,7 @@ class PostgresSchemaTest : public ::testing::Test {
 
 // The next version of the tables, of one more column.
 std::vector<Migration> next_version(std::string_view sql) {
-  return {{postgres_schema().version, sql}};
+  return {{postgres_schema().version, std::string(sql)}};
 }
 
 TEST_F(PostgresSchemaTest, NextVersionKeepsTheTables) {
