@@ -3,7 +3,6 @@
 #include <re2/re2.h>
 
 #include <boost/algorithm/string/replace.hpp>
-#include <initializer_list>
 #include <map>
 #include <sstream>
 #include <string>
@@ -70,16 +69,15 @@ void restore_objects(Database& database, const Schema& schema) {
   append_audit(database, {0, host_utime_us(), "", "", "", "schema_restored", detail.take(), ""});
 }
 
-// Changes of schemas/store.sql since the first release, in its dialect. Each makes the next version.
-constexpr std::initializer_list<std::string_view> schema_changes{};
-
 // The schema of a database whose version before these changes is `version`.
 Schema with_changes(
     std::int64_t version, std::string_view sql,
     std::string (*in_dialect)(std::string) = [](std::string change) { return change; }) {
+  // Changes of schemas/store.sql since the first release, in its dialect. Each makes the next version.
+  const std::vector<std::string> changes{};
   Schema schema{version, sql, {}};
-  for (const std::string_view change : schema_changes)
-    schema.migrations.push_back({schema.version++, in_dialect(std::string(change))});
+  for (const std::string& change : changes)
+    schema.migrations.push_back({schema.version++, in_dialect(change)});
   return schema;
 }
 
