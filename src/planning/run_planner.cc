@@ -57,7 +57,7 @@ std::vector<double> least_parts(const SpeedGrid& grid, const std::vector<double>
   std::vector<double> parts(grid.cells(), least);
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     const double v = std::sqrt(0.5 * (z[k] + z[k + 1])), q = (z[k + 1] - z[k]) / (2 * grid.step[k]);
-    const double beyond = (motor_use(grid, grid.load(k), v, q) - 1) / over_between_rows;
+    const double beyond = (motor_use(grid, grid.load(k), v, q).most() - 1) / over_between_rows;
     if (beyond > 1) parts[k] = std::max(least, std::ceil(std::sqrt(beyond)));
   }
   return parts;
@@ -244,7 +244,7 @@ void RunPlanner::add_floor(SpeedGrid& grid) const {
   const double v = problem_->limits.least_speed_m_s;
   double most = std::min(grid.acceleration_limit, unbound_m_s2);
   for (std::size_t k = 0; k < grid.loads.size(); ++k) {
-    const auto fits = [&](double q) { return motor_use(grid, grid.load(k), v, q) <= 1; };
+    const auto fits = [&](double q) { return motor_use(grid, grid.load(k), v, q).most() <= 1; };
     if (!fits(most) && fits(0)) most = last_that(fits, 0, most, 40);
   }
   grid.floor = v * v;

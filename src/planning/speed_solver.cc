@@ -407,17 +407,7 @@ void SpeedSolver::solve_step() {
 std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   const std::size_t n = grid_.cells();
   const Electric& e = grid_.electric;
-  // Both profiles may press against the same bound; the lower one is drawn with less acceleration.
-  const std::vector<double>& fastest = envelope().fastest;
-  std::vector<double> slowest = envelope().slowest;
-  if (grid_.start > 0 || grid_.end > 0) {
-    for (double part : {0.3, 0.6, 0.8, 0.9, 0.97, 0.99, 0.999}) {
-      slowest = slowest_profile(grid_, part * grid_.acceleration_limit);
-      bool below = true;
-      for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < fastest[k];
-      if (below) break;
-    }
-  }
+  const std::vector<double>&fastest = envelope().fastest, &slowest = envelope().slowest;
   const double top = *std::max_element(fastest.begin(), fastest.end());
   double standing = idle_, viscous = 1e-300, losses = 0;
   for (std::size_t s : {0u, 1u}) {
@@ -439,13 +429,22 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   std::vector<double> z(n + 1);
   z[0] = grid_.start, z[n] = grid_.end;
   double share = wanted.value_or(std::clamp(standing / viscous / top, 0.02, 0.85));
-  for (int attempt = 0; attempt < 40; ++attempt) {
+  for (int attempt = 0; attempt < 10; ++attempt) {
     for (std::size_t k = 1; k < n; ++k) {
       const double top_here = std::min(fastest[k], std::max(gentle[k], 2 * slowest[k]));
       z[k] = slowest[k] + share * (top_here - slowest[k]);
     }
-    if (inside(z)) break;
+    if (inside(z)) return z;
     share = 0.7 * share + (attempt % 2 ? 0.0 : 0.29);
+  }
+  // Between two profiles there may be none that motors can follow: the fastest within a part of the limits.
+  for (const double part : {0.9, 0.99, 0.999, 0.9999}) {
+    SpeedGrid tight = grid_;
+    for (std::size_t k = 1; k < n; ++k) tight.ceiling[k] *= part;
+    for (double* limit : {&tight.acceleration_limit, &tight.torque_limit_nm, &tight.voltage_limit_v})
+      *limit *= part;
+    z = speed_envelope(tight).fastest;
+    if (z[0] == grid_.start && z[n] == grid_.end && inside(z)) break;
   }
   return z;
 }
