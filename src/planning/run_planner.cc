@@ -310,17 +310,10 @@ Result<void> RunPlanner::check_feasible() const {
                           : std::string("the other limits allow"),
                     std::sqrt(bound ? *lowest : fast), bound ? bend : where));
   }
-  // Which end speed would do: the one that the other end's speed can just reach.
-  SpeedGrid open = grid;
-  open.end = open.ceiling.back();
-  const SpeedEnvelope reach = speed_envelope(open);
-  if (reach.fastest.front() >= open.start * (1 - 1e-9)) {
-    const double most = std::sqrt(reach.fastest.back());
-    if (end_ > most) {
-      return fail(
-          Fault::infeasible, "end_speed_m_s",
-          "is " + number(end_) + ", the way is too short: at most " + number(most) + " can be reached");
-    }
+  if (e.broken_at == grid.cells()) {
+    return fail(Fault::infeasible, "end_speed_m_s",
+                "is " + number(end_) + ", the way is too short: at most " +
+                    number(std::sqrt(e.fastest.back())) + " can be reached");
   }
   const double least_end =
       std::sqrt(std::max(0.0, grid.start - 2 * grid.acceleration_limit * run_->length()));
@@ -329,19 +322,16 @@ Result<void> RunPlanner::check_feasible() const {
         Fault::infeasible, "end_speed_m_s",
         "is " + number(end_) + ", the way is too short to brake: at least " + number(least_end) + " remains");
   }
-  open.end = grid.end;
-  open.start = 0;
-  const SpeedEnvelope back = speed_envelope(open);
-  SpeedGrid from_anywhere = grid;
-  from_anywhere.start = from_anywhere.ceiling.front();
-  const double most_start = std::sqrt(speed_envelope(from_anywhere).fastest.front());
-  if (start_ > most_start) {
+  if (e.broken_at == 0) {
     return fail(Fault::infeasible, "start_speed_m_s",
-                "is " + number(start_) + ", the limits allow at most " + number(most_start) + " on this way");
+                "is " + number(start_) + ", the limits allow at most " +
+                    number(std::sqrt(e.fastest.front())) + " on this way");
   }
+  SpeedGrid from_rest = grid;
+  from_rest.start = 0;
   return fail(Fault::infeasible, "limits",
               "no speed satisfies them " + number(where) + " along the way" +
-                  (back.feasible ? "; starting from rest would" : ""));
+                  (speed_envelope(from_rest).feasible ? "; starting from rest would" : ""));
 }
 
 std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
@@ -556,8 +546,9 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
       solver->start_from(start);
     } else {
       start = solver->envelope().fastest;
-      motors_bind =
-          duration_of(grid, start) > duration_of(grid, fastest_without_motors(grid)) * (1 + coarse_tolerance);
+      motors_bind = duration_of(grid, start) >
+                    duration_of(grid, fastest_within(grid, grid.ceiling, grid.acceleration_limit)) *
+                        (1 + coarse_tolerance);
     }
     SpeedSolution s;
     s.z = start, s.duration_s = duration_of(grid, start);

@@ -72,17 +72,8 @@ double mean_speed(double z0, double z1) {
 }
 
 std::vector<double> floor_profile(const SpeedGrid& grid) {
-  const std::size_t n = grid.cells();
-  std::vector<double> floor(n + 1, 0);
-  if (grid.floor == 0) return floor;
-  double way = 0, rest = 0;
-  for (const double step : grid.step) rest += step;
-  for (std::size_t k = 0; k <= n; ++k) {
-    floor[k] = std::min({grid.floor, grid.start + 2 * grid.floor_acceleration * way,
-                         grid.end + 2 * grid.floor_acceleration * rest});
-    if (k < n) way += grid.step[k], rest -= grid.step[k];
-  }
-  return floor;
+  const std::vector<double> floor(grid.cells() + 1, grid.floor);
+  return grid.floor == 0 ? floor : fastest_within(grid, floor, grid.floor_acceleration);
 }
 
 std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration) {
@@ -108,14 +99,12 @@ double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
   return sum;
 }
 
-std::vector<double> fastest_without_motors(const SpeedGrid& grid) {
-  std::vector<double> fastest = grid.ceiling;
+std::vector<double> fastest_within(const SpeedGrid& grid, std::vector<double> fastest, double acceleration) {
   fastest.front() = grid.start, fastest.back() = grid.end;
-  if (!std::isfinite(grid.acceleration_limit)) return fastest;
-  const auto rise = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
   for (std::size_t k = 0; k < grid.cells(); ++k)
-    fastest[k + 1] = std::min(fastest[k + 1], fastest[k] + rise(k));
-  for (std::size_t k = grid.cells(); k-- > 0;) fastest[k] = std::min(fastest[k], fastest[k + 1] + rise(k));
+    fastest[k + 1] = std::min(fastest[k + 1], fastest[k] + 2 * grid.step[k] * acceleration);
+  for (std::size_t k = grid.cells(); k-- > 0;)
+    fastest[k] = std::min(fastest[k], fastest[k + 1] + 2 * grid.step[k] * acceleration);
   return fastest;
 }
 

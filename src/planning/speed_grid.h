@@ -57,8 +57,8 @@ struct SpeedEnvelope {
 };
 SpeedEnvelope speed_envelope(const SpeedGrid& grid);
 
-// The fastest that ceilings and the limit of acceleration leave.
-std::vector<double> fastest_without_motors(const SpeedGrid& grid);
+// The fastest below a ceiling between the ends and with an acceleration within a bound.
+std::vector<double> fastest_within(const SpeedGrid& grid, std::vector<double> ceiling, double acceleration);
 
 // The least z of a grid with a floor, 0 without.
 std::vector<double> floor_profile(const SpeedGrid& grid);

@@ -96,7 +96,7 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
   for (const WheelLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
-  const std::vector<double> fastest = fastest_without_motors(grid_);
+  const std::vector<double> fastest = fastest_within(grid_, grid_.ceiling, grid_.acceleration_limit);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = k > 0 ? bits(of_ceiling) : 0;
     if (std::isfinite(grid_.acceleration_limit)) mask |= bits(of_acceleration);
@@ -416,16 +416,9 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   }
   // Without a limit on acceleration the fastest profile jumps; start on one with a copper loss equal to the
   // idle power.
-  std::vector<double> gentle(n + 1, std::numeric_limits<double>::infinity());
-  if (!std::isfinite(grid_.acceleration_limit) && losses > 0) {
-    const double a = std::sqrt(std::max(standing, 1e-3) / losses);
-    double way = 0, rest = 0;
-    for (double h : grid_.step) rest += h;
-    for (std::size_t k = 0; k <= n; ++k) {
-      gentle[k] = std::min(grid_.start + 2 * a * way, grid_.end + 2 * a * rest);
-      if (k < n) way += grid_.step[k], rest -= grid_.step[k];
-    }
-  }
+  std::vector<double> gentle = fastest;
+  if (!std::isfinite(grid_.acceleration_limit) && losses > 0)
+    gentle = fastest_within(grid_, grid_.ceiling, std::sqrt(std::max(standing, 1e-3) / losses));
   std::vector<double> z(n + 1);
   z[0] = grid_.start, z[n] = grid_.end;
   double share = wanted.value_or(std::clamp(standing / viscous / top, 0.02, 0.85));
