@@ -68,7 +68,7 @@ async function foreign(page, data) {
     const found = [];
     while (walker.nextNode()) {
       const { parentElement, data: text } = walker.currentNode;
-      if (!parentElement.closest('[data-title="Began"], [data-title="Lasted"]')) found.push(text);
+      if (!parentElement.closest('[data-title="Started"], [data-title="Duration"]')) found.push(text);
     }
     return found;
   });

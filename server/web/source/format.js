@@ -75,12 +75,18 @@ export function range(low, high) {
   return `${fixed(low, places)} to ${fixed(high, places)}`;
 }
 
+const placesOf = (deviation) => Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
+
 // "0.54 ± 0.04": two significant digits of the deviation, and the same decimals of the value.
 export function withDeviation(value, deviation) {
   if (!known(deviation) || deviation <= 0) return digits(value);
-  const places = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
+  const places = placesOf(deviation);
   return `${fixed(value, places)} ± ${fixed(deviation, places)}`;
 }
+
+// A value with the decimals of one with this deviation.
+export const likeDeviation = (value, deviation) =>
+  known(deviation) && deviation > 0 ? fixed(value, placesOf(deviation)) : digits(value);
 
 export function percent(share, places = 0) {
   return known(share) ? { n: fixed(share * 100, places), u: '%' } : { n: dash, u: '' };

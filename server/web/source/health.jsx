@@ -55,8 +55,8 @@ export function Health({ state, reasons = [] }) {
         {text}
       </span>
       {listed !== '' && short === '' && (
-        <span class="below" title={`Rejected or repaired samples: ${listed}`}>
-          {listed}
+        <span class="below" title="Rejected, repaired or missing samples since the service started">
+          samples: {listed}
         </span>
       )}
       {short !== '' && (
@@ -92,7 +92,7 @@ export function Reasons({ of, more }) {
 export function chargeNote({ charging, charge, state_of_charge_sd: sd }) {
   const leftS = charge?.time_to_charged_s;
   const left = format.known(leftS) ? `, ${format.about(leftS)}` : '';
-  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, charging has ended' };
+  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger; charging has ended' };
   if (charging) return { text: `charging${left}`, what: `At its charger${left}` };
   return {
     text: format.known(sd) ? `± ${format.share(sd)}` : '',
@@ -124,8 +124,8 @@ export function Charge({ state }) {
 export function between(band, as) {
   if (!format.known(band?.p05) || !format.known(band.p95)) return '';
   return (
-    <span title="90 % of the forecast lies between">
-      <span class="hidden">90 % between </span>
+    <span title="90 % interval of the forecast">
+      <span class="hidden">90 % interval </span>
       {as(band.p05, band.p95)}
     </span>
   );

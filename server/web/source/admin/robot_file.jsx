@@ -157,7 +157,7 @@ function Review({ of, file }) {
           ['Top speed of the motors', format.unit(of.top_speed_m_s, 'm/s')],
           ['Greatest acceleration', format.unit(of.acceleration_m_s2, 'm/s²')],
           ['Full battery', format.unit(of.energy_wh, 'Wh')],
-          ['At rest it lasts', hours],
+          ['Run time at rest', hours],
         ]}
       />
       {missing.length > 0 && (
@@ -200,11 +200,11 @@ function Sources({ onFile, onError }) {
     );
   return (
     <div class="filters">
-      <Field label="Robot file from the disk">
+      <Field label="Load a robot file">
         <input type="file" accept=".json,application/json" onChange={read} />
       </Field>
       <SelectField
-        label="Values of another robot"
+        label="Copy the values of a robot"
         value=""
         onChange={copy}
         options={[['', 'choose …'], ...models]}
@@ -316,7 +316,7 @@ function Form({ groups, id, stored, begun }) {
     refusalFor('admin') ??
     (faulty ? 'The file has faults.' : undefined) ??
     (!stored && known ? `There is a robot ${name} already.` : undefined) ??
-    (stored && changes.length === 0 ? 'Nothing is changed.' : undefined);
+    (stored && changes.length === 0 ? 'Nothing has changed.' : undefined);
   const save = () =>
     put(`/v1/robots/${idPath(name)}`, file).then(() => {
       forgetModel(name);

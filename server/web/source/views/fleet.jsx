@@ -220,7 +220,7 @@ function useTodayRow() {
   const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
   const parts = [
     today.wh_per_km !== null && format.text(consumption(perMetre(today))),
-    then > 0 && `${format.signed(format.share(now / then - 1))} to last ${weekday}`,
+    then > 0 && `${format.signed(format.share(now / then - 1))} against last ${weekday}`,
     ...worthTexts(tariff, now),
   ];
   return ['Today', energy(now), parts.filter(Boolean).join(', ')];

@@ -41,7 +41,7 @@ function Progress({ job, onEnd }) {
   const words =
     now.state === 'queued'
       ? now.ahead > 0
-        ? `${now.ahead} before it`
+        ? `${format.count(now.ahead, 'diagnosis', 'diagnoses')} before it`
         : 'about to start'
       : `${part} %${left}`;
   return (
@@ -132,7 +132,7 @@ function Start({ given, onStart }) {
         ) : (
           <>
             {count !== null && `${format.count(count, 'finished mission')}. `}
-            Every fourth is held back to test the result.
+            Every fourth is held out to test the result.
           </>
         )}
       </p>
