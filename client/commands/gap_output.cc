@@ -275,7 +275,7 @@ std::string signed_per_way(const Json& joules_per_m, const std::string& unit) {
 void print_comparison(const Json& d, const std::string& unit) {
   fmt::print("groups:\n");
   for (const Json& g : d["groups"]) {
-    fmt::print("  {:<14} {}, {:.4g} m", text(g["name"]),
+    fmt::print("  {:<14} {}, {:.0f} m", text(g["name"]),
                count_of(g["missions"].get<std::size_t>(), "mission"), number_or_nan(g["way_m"]));
     if (g["energy_per_m_j"].is_number())
       fmt::print(": measured {}, modelled with the common effects {}", per_way(g["energy_per_m_j"], unit),
