@@ -1138,7 +1138,11 @@ await check('impossible time savings are not offered', async () => {
   await page.keyboard.press('Enter');
   await response;
   await page.locator('.facts').getByText('no shorter time is possible: the robot is at its limits').waitFor();
-  equal(await page.getByText(/(second less|less time) costs at least 0 (J|Wh)/).count(), 0, 'offers for nothing');
+  equal(
+    await page.getByText(/(second less|less time) costs at least 0 (J|Wh)/).count(),
+    0,
+    'offers for nothing',
+  );
   response = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByLabel('Deadline').fill('');
   await page.getByRole('button', { name: 'Compute', exact: true }).click();
