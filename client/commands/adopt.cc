@@ -109,7 +109,7 @@ void add_adopt(CLI::App& program, Exit& exit) {
                   {"--model", &O::model_file, "a robot file", file_of("json"), alternative},
                   {"--effect", &O::effects,
                    "with --diagnosis: which of several indistinguishable effects to adopt", named("EFFECT")},
-                  {"--note", Text{"note"}, "reason, shown in the list of versions", named("TEXT")},
+                  {"--note", Text{"note"}, "reason, shown in the list of versions", named("WORDS")},
                   {"--force", &O::force, "adopt in spite of the back-test or the diagnosis"},
                   {"--dry-run", &O::dry_run, "run the back-test without adopting"},
                   json_row<O>()},

@@ -74,7 +74,7 @@ std::vector<std::string> files(const std::string& begin, const std::string& endi
     if (!own.starts_with(name) || (own.front() == '.' && name.empty())) continue;
     if (entry.is_directory(ignored))
       found.push_back(folder + own + '/');
-    else if (own.ends_with(ending))
+    else if (!ending.empty() && own.ends_with(ending))
       found.push_back(folder + own);
   }
   std::ranges::sort(found);

@@ -328,7 +328,7 @@ void add_check(CLI::App& program, Exit& exit) {
       {{"file", &O::files,
         "robot files, import mappings, LCM event logs, or tables with --mapping; with --server, the robot; "
         "without a file, a running robot",
-        named("FILE")},
+        file_of("json")},
        {"--robot", &O::robot, "robot file to compare recordings and running robots with", file_of("json")},
        {"--mapping", &O::mapping, "import mapping of tables: the meaning of their columns", file_of("json")},
        {"--robot-id", &O::robot_id, "the robot to check: a running one, or one of several in a recording",

@@ -307,7 +307,7 @@ void add_import(CLI::App& program, Exit& exit) {
       {{"recording", &O::tables,
         "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV tables; one mission each unless a column names "
         "them",
-        named("FILE"), required},
+        file_of("csv"), required},
        {"--mapping", &O::mapping,
         "mapping of columns (deploy/import); for bags: topics, joints and signs (import.md)",
         file_of("json")},

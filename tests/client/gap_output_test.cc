@@ -58,7 +58,7 @@ TEST(GapOutput, PrintsSectionsInOrder) {
         "These data do not distinguish slope from grade.",
         "coulomb_friction: probability 96\u00a0%, 19.5 W on average; without it 72 % of the closed gap "
         "returns",
-        "ratio = 0.41 ± 0.02",
+        "ratio = 0.410 ± 0.020",
         "to check: bearings",
         "covariate:cpu_load: probability 81\u00a0%",
         "outside the catalogue: wheel_torque follows time",
@@ -68,7 +68,7 @@ TEST(GapOutput, PrintsSectionsInOrder) {
         "power by term          in the data   robot file  this diagnosis  unit",
         "turning                  1150 ± 12           90            1140  W/(m/s)",
         "Turning costs 1150 W per m/s; the model has 90.",
-        "motor.friction_torque_nm 1.69 ± 0.03 instead of 1.2",
+        "motor.friction_torque_nm 1.690 ± 0.030 instead of 1.2",
         "where the gap arises",
         "battery_power, phase turning: +61 % of the gap (51 to 71 %) in 17 % of the time",
         "next drive, to distinguish a from b:",
@@ -111,7 +111,7 @@ TEST(GapOutput, PrintsDegreesAfterRadians) {
   d.effects[0].parameters = {{"tilt", "rad", 0.1, 0.01}};
   d.where = {{"battery_power", "heading_rad", "", 0, 1.5707963, 0.3, 0.1, {0.2, 0.4}}};
   EXPECT_THAT(printed(gap::diagnosis_to_json(d)),
-              AllOf(HasSubstr("tilt = 0.1 ± 0.01 rad (5.73 deg)"), HasSubstr("(0 to 90 deg)")));
+              AllOf(HasSubstr("tilt = 0.100 ± 0.010 rad (5.73 deg)"), HasSubstr("(0 to 90 deg)")));
 }
 
 // A diagnosis stored by a daemon of an earlier version.
