@@ -1,4 +1,4 @@
-#include "client/virtual_robot/simulate.h"
+#include "client/virtual_robot/truth.h"
 
 #include <fmt/format.h>
 
