@@ -47,24 +47,19 @@ export function Health({ state, reasons = [] }) {
   const noteOf = (r) => (state.fault_notes?.[r] ? `: ${state.fault_notes[r]}` : '');
   const listed = faults.map(([r, n]) => `${format.fixed(n)} ${format.words(r)}${noteOf(r)}`).join(', ');
   const short = shortly(state, reasons);
-  const whole = reasons.map((r) => `${r.message} ${r.action}`).join('\n');
+  const title = short
+    ? reasons.map((r) => `${r.message} ${r.action}`).join('\n')
+    : `Rejected or repaired samples: ${listed}`;
+  const calm = !short || reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged;
   return (
     <>
       <span class="telemetry">
         <span class={`lamp ${level}`} aria-hidden="true" />
         {text}
       </span>
-      {listed !== '' && short === '' && (
-        <span class="below" title={`Rejected or repaired samples: ${listed}`}>
-          {listed}
-        </span>
-      )}
-      {short !== '' && (
-        <span
-          class={reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged ? 'below' : 'below fault'}
-          title={whole}
-        >
-          {short}
+      {(short || listed) && (
+        <span class={calm ? 'below' : 'below fault'} title={title}>
+          {short || listed}
         </span>
       )}
     </>

@@ -3,6 +3,7 @@ import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
+import { unitOf } from './changes.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdicts } from './jobs.jsx';
@@ -13,23 +14,6 @@ const channels = {
   motor_voltage: 'motor voltage',
   battery_voltage: 'battery voltage',
 };
-const suffixes = [
-  ['_m_s2', 'm/s²'],
-  ['_rad_s', 'rad/s'],
-  ['_m_s', 'm/s'],
-  ['_kg', 'kg'],
-  ['_nm', 'N m'],
-  ['_rad', 'rad'],
-  ['_s', 's'],
-  ['_m', 'm'],
-  ['_w', 'W'],
-];
-
-// "speed_m_s" -> ["speed", "m/s"]
-function unitOf(name) {
-  const [suffix, unit] = suffixes.find(([s]) => name.endsWith(s)) ?? ['', ''];
-  return [name.slice(0, name.length - suffix.length), unit];
-}
 
 // Ratios are relative changes of the model's value; angles are shown in degrees, slopes also in percent.
 function strength(effect, name, { value, sd, unit }) {
@@ -48,7 +32,7 @@ function strengths({ id, parameters: all }) {
   const place = all.x_m && all.y_m;
   const lines = Object.entries(all)
     .filter(([name, p]) => (p.value !== 0 || p.sd > 0) && !(place && ['x_m', 'y_m'].includes(name)))
-    .map(([name, p]) => [name === 'ratio' ? 'by' : format.words(unitOf(name)[0]), strength(id, name, p)]);
+    .map(([name, p]) => [name === 'ratio' ? 'by' : unitOf(name)[0], strength(id, name, p)]);
   if (place) lines.push(['centre', `(${format.digits(all.x_m.value)}, ${format.digits(all.y_m.value)}) m`]);
   return lines.map(([name, text]) => (
     <div key={name}>
@@ -59,8 +43,7 @@ function strengths({ id, parameters: all }) {
 
 // "speed_m_s" from 0.2 to 0.4 -> ["speed", "0.2 to 0.4 m/s"]
 function region(w) {
-  const [plain, unit] = unitOf(w.variable);
-  const name = format.words(plain);
+  const [name, unit] = unitOf(w.variable);
   if (typeof w.from === 'string') return [name, unit ? `${w.from.replaceAll('-', '−')} ${unit}` : w.from];
   if (!unit.startsWith('rad')) return [name, `${format.range(w.from, w.to)} ${unit}`];
   return [name, `${format.range(format.degrees(w.from), format.degrees(w.to))} °${unit.slice(3)}`];

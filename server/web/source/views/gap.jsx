@@ -81,12 +81,8 @@ function Start({ given, onStart }) {
     event.preventDefault();
     setBusy(true);
     setError(null);
-    try {
-      const job = await post('/v1/diagnoses', { robot_id: chosen, max_missions: Number(missions) });
-      onStart(job);
-    } catch (problem) {
-      setError(problem);
-    }
+    const body = { robot_id: chosen, max_missions: Number(missions) };
+    await post('/v1/diagnoses', body).then(onStart, setError);
     setBusy(false);
   };
   if (live.loaded && robots.length === 0)
