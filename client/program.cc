@@ -18,7 +18,6 @@ void prepare(CLI::App& program, const std::string& version) {
   program.formatter(std::make_shared<HelpFormatter>(help_width()));
   program.get_help_ptr()->description("print this help and exit");
   program.set_version_flag("--version", version, "print the version and exit");
-  program.footer(exit_codes_help);
   program.require_subcommand(1);
 }
 

@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 10 (user_version; src/history/schema.cc lists the migrations). PostgreSQL has the same
+-- The history of a fleet, whose version is in user_version (src/history/schema.cc lists the changes). PostgreSQL has the same
 -- tables with BIGINT, DOUBLE PRECISION, BYTEA and TEXT COLLATE "C", and the additions of store.postgresql.sql.
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.

@@ -177,15 +177,15 @@ struct Application::Parts {
     const bool by_path = options.store_url.empty();
     TRY_ASSIGN(server::ClusterOptions wanted, cluster_options(options));
     if (!wanted.name.empty()) in_cluster = std::move(wanted);
-    TRY_ASSIGN(const auto options_of_store, store_options(options));
-    Result<std::unique_ptr<history::Store>> opened =
-        in_cluster ? history::open_shared_store(
-                         in_cluster->url, in_cluster->writer,
-                         [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
-                           if (joined) cluster->on_dropped(robot_id, epoch, count);
-                         },
-                         options_of_store)
-                   : history::open_store(store_url(options), options_of_store);
+    TRY_ASSIGN(auto options_of_store, store_options(options));
+    if (in_cluster) {
+      options_of_store.shared_writer = in_cluster->writer;
+      options_of_store.on_dropped = [this](const std::string& robot_id, history::Epoch epoch,
+                                           std::uint64_t count) {
+        if (joined) cluster->on_dropped(robot_id, epoch, count);
+      };
+    }
+    auto opened = history::open_store(in_cluster ? in_cluster->url : store_url(options), options_of_store);
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));

@@ -88,8 +88,9 @@ Result<Exit> adopt_model(AdoptOptions& options) {
 
 void add_proposals(CLI::App& program, Exit& exit) {
   using O = ProposalsOptions;
-  add_command<O>(program, exit, "proposals", "List models proposed by missions, newest first", list_proposals,
-                 {server_row<O>(), robot_row<O>("only of this robot"), json_row<O>()},
+  add_command<O>(program, exit, "proposals",
+                 "List models that the daemon proposes from missions, newest first", list_proposals,
+                 {server_row<O>(), robot_row<O>("only proposals for this robot"), json_row<O>()},
                  "joulecast proposals --server http://127.0.0.1:8080");
 }
 
@@ -106,9 +107,9 @@ void add_adopt(CLI::App& program, Exit& exit) {
                   {"--version", &O::version, "number of an earlier version, without a back-test", positive(),
                    alternative},
                   {"--model", &O::model_file, "a robot file", file_of("json"), alternative},
-                  {"--effect", &O::effects, "with --diagnosis: the one to adopt of indistinguishable effects",
-                   named("EFFECT")},
-                  {"--note", Text{"note"}, "reason, for the list of versions", named("WORDS")},
+                  {"--effect", &O::effects,
+                   "with --diagnosis: which of several indistinguishable effects to adopt", named("EFFECT")},
+                  {"--note", Text{"note"}, "reason, shown in the list of versions", named("WORDS")},
                   {"--force", &O::force, "adopt in spite of the back-test or the diagnosis"},
                   {"--dry-run", &O::dry_run, "run the back-test without adopting"},
                   json_row<O>()},

@@ -190,9 +190,9 @@ void print_price_of_time(double duration_s, const Json& certificate, const std::
   if (!(price_w >= least_shown_w)) {
     fmt::print("this duration needs the least energy{}\n", least);
   } else if (duration_s - shortest_s < 1) {
-    fmt::print("less time would cost {:.3g} {} a second or more{}\n", in_unit(price_w, unit), unit, least);
+    fmt::print("less time would cost at least {:.3g} {} per second{}\n", in_unit(price_w, unit), unit, least);
   } else {
-    fmt::print("a second less would cost {:.3g} {} or more{}\n", in_unit(price_w, unit), unit, least);
+    fmt::print("one second less would cost at least {:.3g} {}{}\n", in_unit(price_w, unit), unit, least);
   }
 }
 
@@ -203,13 +203,13 @@ void print_profile(const Json& a, const std::string& unit) {
              energy_text(number_at(a, "braking_j"), unit), unit,
              energy_text(number_at(a, "recovered_j"), unit), unit);
   const Json& c = member_at(a, "certificate");
-  fmt::print("{}: at most {:.3g} {} above the optimum\n", text_of(member_at(c, "method")),
-             in_unit(number_at(c, "gap_j"), unit), unit);
+  fmt::print("at most {:.3g} {} above the optimum (method: {})\n", in_unit(number_at(c, "gap_j"), unit), unit,
+             text_of(member_at(c, "method")));
   print_price_of_time(number_at(a, "duration_s"), c, unit);
   for (const auto& [shape, baseline] : member_at(a, "baselines").items()) {
     if (baseline.is_null()) continue;
     if (!baseline.value("within_limits", true)) {
-      fmt::print("a {} of the same time would exceed the robot's limits\n", shape);
+      fmt::print("a {} of the same duration would exceed the robot's limits\n", shape);
       continue;
     }
     fmt::print("against a {:<10} {:>10} {}, {:.1f} % saved\n", shape,
@@ -324,7 +324,7 @@ Rows drive_rows() {
        {"--start-speed", Number{"start_speed_m_s"}, "speed at the start, m/s; standing by default"},
        {"--end-speed", Number{"end_speed_m_s"}, "speed at the end, m/s; standing by default"},
        {"--regeneration", Number{"regeneration"},
-        "share of braking power that returns to the battery, 0 to 1"}});
+        "fraction of the braking power that returns to the battery, 0 to 1"}});
 }
 
 // A request to one robot of a server names it.
@@ -337,9 +337,10 @@ void need_robot(CLI::App& command) {
 void add_profile(CLI::App& program, Exit& exit) {
   auto* command = add_command<AskOptions>(
       program, exit, "profile", "Plan the minimum-energy motion along a path", run_drive_question<profile>,
-      with(drive_rows(),
-           {{"--energy-budget", Number{"energy_budget_j"}, "the fastest motion within this energy, in J"},
-            {"--pareto", Number{"pareto_points"}, "number of points on the front of energy against time"}}),
+      with(
+          drive_rows(),
+          {{"--energy-budget", Number{"energy_budget_j"}, "plan the fastest motion within this energy, J"},
+           {"--pareto", Number{"pareto_points"}, "number of points on the Pareto front of energy and time"}}),
       "joulecast profile --robot amr.json --length 10 --payload 20\n"
       "joulecast profile --robot amr.json --length 10 --deadline 14 --json\n"
       "joulecast profile amr --server http://127.0.0.1:8080 --turn 90deg --length 10 --pareto 5");
@@ -374,12 +375,12 @@ void add_autonomy(CLI::App& program, Exit& exit) {
   auto* command = add_command<AskOptions>(
       program, exit, "autonomy",
       "Compute a robot's remaining range and time, and whether it can do a list of tasks", run_autonomy,
-      with(common_rows("robot of the server; all of them when not given"),
+      with(common_rows("robot of the server; default: all"),
            {{"--charge", Number{"state_of_charge"}, "state of charge instead of the live one, 0 to 1"},
             {"--charge-sd", Number{"state_of_charge_sd"}, "its standard deviation"},
             {"--reserve", Number{"reserve_fraction"}, "charge to keep instead of the robot file's, 0 to 1"},
             {"--payload", Number{"payload_kg"}, "payload now, kg"},
-            {"--speed", Number{"speed_m_s"}, "cruising speed of the plan, m/s, instead of the robot's habit"},
+            {"--speed", Number{"speed_m_s"}, "cruising speed, m/s, instead of the robot's usual one"},
             {"--confidence", Number{"confidence"},
              "confidence of the latest departure to the charger, 0.01 to 0.999"},
             driving_row("as the robot usually drives (the default), or by minimum-energy profiles"),

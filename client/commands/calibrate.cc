@@ -150,11 +150,11 @@ Result<Exit> run_calibrate(CalibrateOptions& options) {
 
 void add_calibrate(CLI::App& program, Exit& exit) {
   using O = CalibrateOptions;
-  auto& group = add_group(program, "calibrate", "Identify parameters from recordings");
+  auto& group = add_group(program, "calibrate", "Estimate parameters from recordings");
   add_calibrate_drive(group, exit);
   add_command<O>(
       group, exit, "battery",
-      "Identify a battery from CSV recordings (columns t_s, I_A discharging positive, V_V, T_C) of a slow "
+      "Estimate a battery from CSV recordings (columns t_s, I_A discharging positive, V_V, T_C) of a slow "
       "full discharge, pulses and constant currents",
       run_calibrate,
       {{"recordings", &O::sources,
@@ -163,8 +163,9 @@ void add_calibrate(CLI::App& program, Exit& exit) {
         "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
         "open-circuit voltage",
         file_of("csv"), required},
-       {"--capacity-ah", &O::rated_capacity_ah, "rated capacity; gives an ageing factor", positive()},
-       {"--reserve", &O::reserve_fraction, "share of the charge that planning keeps in reserve",
+       {"--capacity-ah", &O::rated_capacity_ah, "rated capacity, Ah; determines an ageing factor",
+        positive()},
+       {"--reserve", &O::reserve_fraction, "fraction of the charge that planning keeps in reserve",
         between(0.0, 0.99)},
        {"--out", &O::out, "file for the battery object of a robot file", file_of("json"), required},
        {"--force", &O::force, force_help},

@@ -334,7 +334,7 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
   using O = CalibrateDriveOptions;
   add_command<O>(
       group, exit, "drive",
-      "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
+      "Estimate a drive from event logs, of motor voltages and currents or of battery power alone, and test "
       "it on other missions",
       run_drive,
       {{"log", &O::logs, "LCM event logs", file_of("lcmlog"), required},
@@ -353,7 +353,7 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
        {"--known", &O::known, "parameters to keep from the robot file: resistance, constants",
         one_of({"resistance", "constants"}), commas},
        {"--steady-acceleration", &O::steady_fraction_1_s,
-        "constant speed: acceleration below this share of the top speed a second", positive()},
+        "greatest acceleration at constant speed, as a fraction of the top speed per second", positive()},
        {"--contradicted", &O::contradicted,
         "identify also from channels that joulecast check finds contradicted, for instance because of a "
         "mismatched robot file"},

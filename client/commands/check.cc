@@ -288,7 +288,7 @@ void print_check(const Report& report) {
     fmt::print("{:<32} {:>8} messages, {:.4g} a second\n", channel, tally.messages, tally.rate_hz());
   print(report.findings);
   if (!report.robot && !report.watch.channels().empty())
-    fmt::print("units and signs are compared with a robot file only: --robot FILE\n");
+    fmt::print("units and signs were not checked: that needs --robot FILE\n");
 }
 
 Result<Exit> run_check(CheckOptions& options) {
@@ -336,7 +336,7 @@ void add_check(CLI::App& program, Exit& exit) {
        {"--server", &O::server, "query a daemon for the running robot instead of LCM", named("URL")},
        {"--lcm-url", &O::lcm_url, "LCM provider to receive a running robot from; default: JOULECAST_LCM_URL",
         named("URL")},
-       {"--seconds", &O::seconds, "time to listen [s]", positive()},
+       {"--seconds", &O::seconds, "time to listen, s", positive()},
        {"--json", &O::json, "print the findings as JSON"}},
       "joulecast check amr.json mapping.json\n"
       "joulecast check amr.lcmlog --robot amr.json --json");

@@ -51,7 +51,7 @@ struct CompletionOptions {
 void add_completion(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<CompletionOptions>();
   auto* command = program.add_subcommand("completion", "Print a completion script for a shell");
-  add_option(*command, "shell", options->shell, "which shell", one_of({"bash", "zsh", "fish"}));
+  add_option(*command, "shell", options->shell, "shell of the script", one_of({"bash", "zsh", "fish"}));
   // For the scripts only: prints the completions of the last word.
   command->add_flag("--candidates", options->candidates)->group("");
   command->add_option("words", options->words)->group("");

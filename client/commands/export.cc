@@ -96,31 +96,31 @@ void add_export(CLI::App& program, Exit& exit) {
   const Row<O> server = server_row<O>(),
                out{"--out", &O::out, "CSV file to write, - for standard output", file_of("csv")},
                force{"--force", &O::force, force_help},
-               robot{"robot,--robot-id", Text{"robot_id"}, "only this robot's", named("ROBOT")},
+               robot{"robot,--robot-id", Text{"robot_id"}, "only missions of this robot", named("ROBOT")},
                from{"--from", Text{"from_utime_us"}, from_help, time_value()},
                to{"--to", Text{"to_utime_us"}, to_help, end_time_value()},
                mission{"mission,--mission", &O::mission, mission_help, named("MISSION"), required};
   add_command<O>(
-      group, exit, "missions", "Missions with their energy and ratio, one a line", export_missions,
+      group, exit, "missions", "Write one line for each mission: its energy and ratio", export_missions,
       {server, robot, from, to, out, force},
       "joulecast export missions --server http://127.0.0.1:8080 --from 2026-11-21 --out missions.csv");
   add_command<O>(
-      group, exit, "floor", "Energy and gap by floor square, over all missions", export_floor,
+      group, exit, "floor", "Write the energy and gap of each floor square, over all missions", export_floor,
       {server,
        robot,
        from,
        to,
-       {"--cell", Text{"cell_m"}, "side of a square, m; default: 1", named("METRES")},
+       {"--cell", Text{"cell_m"}, "side of a square, m (default 1)", named("NUMBER")},
        out,
        force},
       "joulecast export floor --server http://127.0.0.1:8080 --from 2026-11-21 --cell 2 --out floor.csv");
-  add_command<O>(group, exit, "telemetry", "Every sample of a mission as received, with all digits",
+  add_command<O>(group, exit, "telemetry", "Write every sample of a mission as received, with all digits",
                  export_telemetry, {server, mission, out, force},
                  "joulecast export telemetry --server http://127.0.0.1:8080 --mission 1 --out samples.csv");
-  add_command<O>(group, exit, "trace", "Power, speed, charge and position over a mission", export_trace,
+  add_command<O>(group, exit, "trace", "Write power, speed, charge and position over a mission", export_trace,
                  {server,
                   mission,
-                  {"--points", Text{"points"}, "largest number of intervals", named("COUNT")},
+                  {"--points", Text{"points"}, "greatest number of intervals", named("INTEGER")},
                   out,
                   force},
                  "joulecast export trace 1 --server http://127.0.0.1:8080 --points 500 --out trace.csv");

@@ -134,7 +134,7 @@ std::string summary_of(const RmfOptions& options, const RmfFit& fit) {
   if (fit.error_before) text += fmt::format("; {} before", error_text(*fit.error_before));
   return text +
          fmt::format(
-             ";\n# {} if turns were priced by their angle, at {:.3g} J/rad, which this model cannot.\n",
+             ";\n# {} if turns were priced by their angle, at {:.3g} J/rad, which RMF's model cannot do.\n",
              error_text(fit.error_with_turns), fit.turn_j_per_rad);
 }
 
@@ -194,13 +194,14 @@ void add_export_rmf(CLI::App& group, Exit& exit) {
   using O = RmfOptions;
   add_command<O>(
       group, exit, "rmf",
-      "Battery, mechanical, ambient and tool parameters of an Open-RMF fleet configuration, fitted to "
+      "Write the battery, mechanical, ambient and tool parameters of an Open-RMF fleet configuration, fitted "
+      "to "
       "missions",
       export_rmf,
       {server_row<O>(),
        {"robot,--robot-id", &O::robot_id, "robot of the server", named("ROBOT"), required},
        {"--config", &O::config,
-        "fleet configuration in YAML: its values are replaced, and its error is stated", file_of("yaml")},
+        "fleet configuration in YAML: its values are replaced and its error is reported", file_of("yaml")},
        {"--missions", &O::missions, "number of missions to fit to and test on, newest first",
         between(1, 1000)},
        {"--out", &O::out, "file to write, - for standard output", file_of("yaml")},

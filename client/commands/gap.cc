@@ -219,10 +219,10 @@ void add_gap(CLI::App& program, Exit& exit) {
         "write the robot file with the effects found, or a corrected one if it belongs to another robot; "
         "rejected, with the reason, if the diagnosis does not support it",
         file_of("json")},
-       {"--effect", &O::effect, "with --apply or --adopt: the one to adopt of indistinguishable effects",
-        named("EFFECT")},
+       {"--effect", &O::effect,
+        "with --apply or --adopt: which of several indistinguishable effects to adopt", named("EFFECT")},
        {"--test", &O::test,
-        "logs of other missions: replay them with and without the effects found, and compare with a plain "
+        "logs of other missions: replay them with and without the effects found, and compare with a linear "
         "regression on the missions of the diagnosis; --apply is refused where they show no improvement or "
         "the regression predicts them better",
         file_of("lcmlog"), Excludes{"--missions"}},

@@ -28,8 +28,16 @@ std::string text(const Json& value) {
   return value.is_string() ? value.get<std::string>() : "";
 }
 
-std::string degrees(double rad) {
-  return fmt::format("{:.3g} deg", rad * 180 / std::numbers::pi);
+double degrees(double rad) {
+  return rad * 180 / std::numbers::pi;
+}
+
+// The figures of the command line have a hyphen for a minus.
+std::string with_hyphens(std::string figures) {
+  constexpr std::string_view minus = "−";
+  for (auto at = figures.find(minus); at != std::string::npos; at = figures.find(minus, at))
+    figures.replace(at, minus.size(), "-");
+  return figures;
 }
 
 // "phase turning", "speed_m_s 0.2 to 0.4", with degrees where the variable is an angle.
@@ -38,12 +46,10 @@ std::string region_words(const Json& w) {
   if (w["from"].is_string()) return variable + " " + text(w["from"]);
   const double from = number_or_nan(w["from"]), to = number_or_nan(w["to"]);
   std::string range = gap::brief_range(from, to);
-  constexpr std::string_view minus = "−";  // other figures of the command line have a hyphen
-  for (auto at = range.find(minus); at != std::string::npos; at = range.find(minus, at))
-    range.replace(at, minus.size(), "-");
-  if (variable.ends_with("_rad")) range += fmt::format(" ({} to {})", degrees(from), degrees(to));
-  if (variable.ends_with("_rad_s")) range += fmt::format(" ({} to {}/s)", degrees(from), degrees(to));
-  return variable + " " + range;
+  const bool angle = variable.ends_with("_rad"), rate = variable.ends_with("_rad_s");
+  if (angle || rate)
+    range += fmt::format(" ({} deg{})", gap::brief_range(degrees(from), degrees(to)), rate ? "/s" : "");
+  return variable + " " + with_hyphens(range);
 }
 
 // A sentence as an item of a list.
@@ -61,9 +67,18 @@ double percent_at(const Json& of, std::string_view path) {
   return 100 * number_or_nan(member_at(of, path));
 }
 
-// " ± 0.02" of a standard deviation, if there is one.
-std::string plus_minus(const Json& sd) {
-  return sd.is_number() ? fmt::format(" ± {:.2g}", sd.get<double>()) : "";
+// "2.31 ± 0.02", or "2.312" without a standard deviation.
+std::string with_deviation(const Json& value, const Json& sd) {
+  const double deviation = number_or_nan(sd);
+  return deviation > 0 ? with_hyphens(gap::with_deviation(number_or_nan(value), deviation, ""))
+                       : fmt::format("{:.4g}", number_or_nan(value));
+}
+
+// A figure with the decimal places of a value with this deviation; "-" if it is missing.
+std::string figure_like(const Json& sd, const Json& of, const char* name) {
+  const double value = number_or_nan(member_at(of, name)), deviation = number_or_nan(sd);
+  return std::isfinite(value) && deviation > 0 ? fmt::format("{:.{}f}", value, gap::places_of(deviation))
+                                               : figure(of, name);
 }
 
 void print_checks(const Json& d) {
@@ -95,8 +110,9 @@ void print_gap(const Json& d) {
   } else if (member_at(d, "gap/energy_relative").is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
-    fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} %{}{}\n", percent_at(d, "gap/energy_relative"),
-               percent_at(d, "gap/power_absolute_relative"), in_brackets("noise floor ", d["gap"]),
+    fmt::print("gap: {:+.1f} % of the measured energy; mean absolute power error {:.1f} %{}{}\n",
+               percent_at(d, "gap/energy_relative"), percent_at(d, "gap/power_absolute_relative"),
+               in_brackets("noise floor ", d["gap"]),
                of_motors ? ", of the motors' power with the file's idle power" : "");
   }
   std::string others;
@@ -104,7 +120,7 @@ void print_gap(const Json& d) {
     if (name != "battery_power" && !(of_motors && name == "motor_power"))
       others += fmt::format("{}{} {:.1f} %{}", others.empty() ? "" : ", ", name,
                             percent_at(gap, "absolute_relative"), in_brackets("", gap));
-  if (!others.empty()) fmt::print("other readings: {}\n", others);
+  if (!others.empty()) fmt::print("error of other readings (noise floor): {}\n", others);
 }
 
 // The terms of a linear regression of the power: in the data, in the model, and in the model with what was
@@ -112,19 +128,19 @@ void print_gap(const Json& d) {
 void print_terms(const Json& d) {
   const Json& baseline = member_at(d, "baseline");
   if (!baseline.is_object()) return;
-  constexpr auto row = "  {:<14}{:>20}{:>13}{:>13}  {}\n";
+  constexpr auto row = "  {:<14}{:>20}{:>13}{:>16}  {}\n";
   if (!baseline["terms"].empty())
-    fmt::print(row, "power by term", "in the data", "robot file", "explained", "unit");
+    fmt::print(row, "power by term", "in the data", "robot file", "this diagnosis", "unit");
   for (const auto& [name, term] : baseline["terms"].items()) {
-    fmt::print(row, name, figure(term, "value") + plus_minus(term["sd"]), figure(term, "model"),
-               figure(term, "explained"), text(term["unit"]));
+    fmt::print(row, name, with_deviation(term["value"], term["sd"]), figure_like(term["sd"], term, "model"),
+               figure_like(term["sd"], term, "explained"), text(term["unit"]));
   }
   const Json& reasons = member_at(d, "reasons");
   for (const Json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
 }
 
-// "robot file 75.1 %, explained 12.4 %, regression 18.5 %, noise 7.8 %; the gap shrinks by 84 % [76, 87]"
+// "robot file 75.1 %, this diagnosis 12.4 %, linear regression 18.5 %, noise floor 7.8 %"
 void print_held_out(const Json& d) {
   const Json &s = member_at(d, "shrinkage"), &baseline = member_at(d, "baseline");
   const bool found = !d["effects"].empty() && member_at(s, "held_out_before").is_number();
@@ -135,19 +151,20 @@ void print_held_out(const Json& d) {
   };
   if (baseline.is_object()) {
     add("robot file", baseline["unchanged_model_held_out"]);
-    add("explained", baseline["explanation_held_out"]);
-    add("regression", baseline["held_out"]);
+    add("this diagnosis", baseline["explanation_held_out"]);
+    add("linear regression", baseline["held_out"]);
   } else if (found) {
     add("robot file", s["held_out_before"]);
-    add("explained", s["held_out_after"]);
+    add("this diagnosis", s["held_out_after"]);
   }
   if (line.empty()) return;
-  add("noise", d["gap"]["noise_floor"]);
-  fmt::print("held-out error of the power: {}\n", line);
+  add("noise floor", d["gap"]["noise_floor"]);
+  fmt::print("power error on held-out data: {}\n", line);
   if (!found) return;
   const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
-  fmt::print("  the causes close {:.0f} % of the gap [{:.0f}, {:.0f}]{}\n", percent_at(s, "fraction"),
-             100 * low, 100 * high, low < 0 && high >= 0 ? ": they may not help on held-out parts" : "");
+  fmt::print("  the effects close {:.0f} % of the gap (95 % interval {:.0f} to {:.0f} %){}\n",
+             percent_at(s, "fraction"), 100 * low, 100 * high,
+             low < 0 && high >= 0 ? ": they may not help" : "");
 }
 
 void print_corrections(const Json& d) {
@@ -155,15 +172,15 @@ void print_corrections(const Json& d) {
   if (corrections.empty()) return;
   fmt::print("values of the robot file that fit:\n");
   for (const Json& c : corrections)
-    fmt::print("  {} {}{} instead of {}\n", text(c["parameter"]), figure(c, "fits"), plus_minus(c["sd"]),
+    fmt::print("  {} {} instead of {}\n", text(c["parameter"]), with_deviation(c["fits"], c["sd"]),
                figure(c, "file"));
 }
 
 void print_where(const Json& regions) {
-  if (!regions.empty()) fmt::print("where:\n");
+  if (!regions.empty()) fmt::print("where the gap arises (95 % interval); regions overlap:\n");
   for (std::size_t k = 0; k < regions.size() && k < most_regions; ++k) {
     const Json& w = regions[k];
-    fmt::print("  {}, {}: {:+.0f} % of the gap [{:.0f}, {:.0f}]", text(w["channel"]), region_words(w),
+    fmt::print("  {}, {}: {:+.0f} % of the gap ({:.0f} to {:.0f} %)", text(w["channel"]), region_words(w),
                percent_at(w, "share"), 100 * number_or_nan(w["ci"][0]), 100 * number_or_nan(w["ci"][1]));
     if (w.contains("time_share")) fmt::print(" in {:.0f} % of the time", percent_at(w, "time_share"));
     fmt::print("\n");
@@ -176,8 +193,9 @@ void print_next_drives(const Json& drives) {
     if (text(n["separates"]) != separated)
       fmt::print("next drive, to distinguish {}:\n", separated = text(n["separates"]));
     const Json& evidence = n["expected_log_evidence"];
-    print_item(text(n["manoeuvre"]) +
-               (evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number_or_nan(evidence))));
+    print_item(
+        text(n["manoeuvre"]) +
+        (evidence.is_null() ? "" : fmt::format(" (expected log evidence {:.1f})", number_or_nan(evidence))));
   }
 }
 
@@ -191,18 +209,21 @@ void print_adoption(const Json& d) {
 void print_effect(const Json& e) {
   fmt::print("  {}: probability {}", text(e["id"]), gap::probability_text(number_or_nan(e["probability"])));
   if (!e["alternatives"].empty() && e.contains("group"))
-    fmt::print(" ({} of it or an alternative)", gap::probability_text(number_or_nan(e["group"])));
-  if (number_or_nan(member_at(e, "power_w")) > 0) fmt::print(", {:.3g} W", number_or_nan(e["power_w"]));
+    fmt::print(" ({} with its alternatives)", gap::probability_text(number_or_nan(e["group"])));
+  if (number_or_nan(member_at(e, "power_w")) > 0)
+    fmt::print(", {:.3g} W on average", number_or_nan(e["power_w"]));
   if (e["share"].is_number())
-    fmt::print("; {:.0f} % of the closed gap returns without it", percent_at(e, "share"));
+    fmt::print("; without it {:.0f} % of the closed gap returns", percent_at(e, "share"));
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {
       if (p["sd"].is_number() != estimated) continue;
       const double value = number_or_nan(p["value"]);
-      fmt::print("    {} = {:.4g}{}{}{}\n", name, value, plus_minus(p["sd"]),
+      fmt::print("    {} = {}{}{}\n", name, with_deviation(p["value"], p["sd"]),
                  p["unit"] == "1" ? "" : " " + text(p["unit"]),
-                 p["unit"] == "rad" ? fmt::format(" ({})", degrees(value)) : "");
+                 p["unit"] == "rad" ? fmt::format(" ({:.3g} deg)", degrees(value))
+                 : name == "side"   ? (value < 0.5 ? " (right)" : " (left)")
+                                    : "");
     }
   }
   if (const Json& others = e["alternatives"]; !others.empty()) {
@@ -214,11 +235,11 @@ void print_effect(const Json& e) {
     fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
 }
 
-// " scrub stribeck", or " nothing".
+// " scrub stribeck", or " none".
 std::string names_in(const Json& ids) {
   std::string names;
   for (const Json& id : ids) names += " " + text(id);
-  return names.empty() ? " nothing" : names;
+  return names.empty() ? " none" : names;
 }
 
 void print_limits(const Json& d) {
@@ -228,13 +249,13 @@ void print_limits(const Json& d) {
 
 // What a diagnosis of runs has in addition.
 void print_runs(const Json& d) {
-  fmt::print("model by {}; scatter of the runs {:.1f} % in addition to any cause\n",
+  fmt::print("modelled energies from {}; the runs scatter by {:.1f} % in addition to any cause\n",
              member_at(d, "model/given") == true ? "the table" : "the robot file",
              percent_at(d, "scatter/run"));
   if (!d["left_out_conditions"].empty())
-    fmt::print("mean error of the runs of one condition, with all of them held out:\n");
+    fmt::print("mean error of the runs of one condition when all of them are held out:\n");
   for (const Json& l : d["left_out_conditions"])
-    fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (regression {:.1f} %), named:{}\n",
+    fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (linear regression {:.1f} %), effects:{}\n",
                text(l["left_out"]), l["runs"].get<std::size_t>(), percent_at(l, "held_out_before"),
                percent_at(l, "held_out_after"), percent_at(l, "baseline_held_out"), names_in(l["effects"]));
   print_limits(d);
@@ -254,10 +275,10 @@ std::string signed_per_way(const Json& joules_per_m, const std::string& unit) {
 void print_comparison(const Json& d, const std::string& unit) {
   fmt::print("groups:\n");
   for (const Json& g : d["groups"]) {
-    fmt::print("  {:<14} {}, {:.4g} m", text(g["name"]),
+    fmt::print("  {:<14} {}, {:.0f} m", text(g["name"]),
                count_of(g["missions"].get<std::size_t>(), "mission"), number_or_nan(g["way_m"]));
     if (g["energy_per_m_j"].is_number())
-      fmt::print(": {}, by the model with the common effects {}", per_way(g["energy_per_m_j"], unit),
+      fmt::print(": measured {}, modelled with the common effects {}", per_way(g["energy_per_m_j"], unit),
                  per_way(g["model_per_m_j"], unit));
     fmt::print("\n");
   }
@@ -265,14 +286,14 @@ void print_comparison(const Json& d, const std::string& unit) {
     fmt::print("{} {} above the group where it is weakest:\n", text(e["id"]), text(e["parameter"]));
     for (const Json& g : d["groups"]) {
       const Json& s = e["groups"][text(g["name"])];
-      fmt::print("  {:<14} {:.4g}{}{}", text(g["name"]), number_or_nan(s["value"]), plus_minus(s["sd"]),
+      fmt::print("  {:<14} {}{}", text(g["name"]), with_deviation(s["value"], s["sd"]),
                  e["unit"] == "1" ? "" : " " + text(e["unit"]));
       if (s["energy_per_m_j"].is_number()) fmt::print(" ({})", signed_per_way(s["energy_per_m_j"], unit));
       fmt::print("\n");
     }
   }
   if (const Json& by = d["difference"]; !by.is_null()) {
-    fmt::print("{} takes {} more than {}: {} by motion and load", text(by["to"]),
+    fmt::print("{} uses {} more than {}: {} by motion and load", text(by["to"]),
                per_way(by["energy_per_m_j"], unit), text(by["from"]),
                signed_per_way(by["by_motion_j"], unit));
     for (const Json& e : d["strengths"])
@@ -335,17 +356,17 @@ void print_diagnosis(const Json& d, const std::string& unit) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  print_terms(d);
-  fmt::print("verdict: {} (probability {})\n", text(d["verdict"]),
+  fmt::print("verdict: {} (probability {})\n", gap::verdict_words(text(d["verdict"])),
              gap::probability_text(number_or_nan(d["verdict_probability"])));
   for (const Json& reason : member_at(d, "reasons")) print_item(text(reason));
   for (const Json& e : d["effects"]) print_effect(e);
   if (!text(d["outside"]["channel"]).empty()) {
-    fmt::print("  outside the catalogue: {} follows {}, probability {}\n", text(d["outside"]["channel"]),
+    fmt::print("  outside the catalogue: {} follows {} (probability {})\n", text(d["outside"]["channel"]),
                text(d["outside"]["follows"]),
                gap::probability_text(number_or_nan(d["outside"]["probability"])));
   }
   print_held_out(d);
+  print_terms(d);
   print_corrections(d);
   print_where(d["where"]);
   print_next_drives(d["next_drive"]);

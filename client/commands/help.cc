@@ -8,6 +8,7 @@
 
 #include "base/nearest_word.h"
 #include "client/commands/option.h"
+#include "client/commands/outcome.h"
 #include "client/wrapped.h"
 
 namespace joulecast::client {
@@ -49,6 +50,10 @@ std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest
   return "does not accept " + rest.front();
 }
 
+const CLI::App& program_of(const CLI::App& app) {
+  return app.get_parent() == nullptr ? app : program_of(*app.get_parent());
+}
+
 }  // namespace
 
 std::string HelpFormatter::row(const std::string& left, const std::string& text) const {
@@ -64,9 +69,8 @@ std::string HelpFormatter::row(const std::string& left, const std::string& text)
 
 std::string HelpFormatter::make_usage(const CLI::App* app, std::string) const {
   const std::string path = command_path(*app);
-  const CLI::App* program = app;
-  while (program->get_parent() != nullptr) program = program->get_parent();
-  return '\n' + CLI::Formatter::make_usage(app, program->get_name() + (path.empty() ? "" : " " + path));
+  return '\n' +
+         CLI::Formatter::make_usage(app, program_of(*app).get_name() + (path.empty() ? "" : " " + path));
 }
 
 std::string HelpFormatter::make_description(const CLI::App* app) const {
@@ -100,7 +104,10 @@ std::string HelpFormatter::make_subcommand(const CLI::App* sub) const {
 }
 
 std::string HelpFormatter::make_footer(const CLI::App* app) const {
-  return app->get_footer() + '\n';
+  return app->get_footer() +
+         (app->get_parent() == nullptr ? exit_codes_help
+                                       : "Exit codes: " + program_of(*app).get_name() + " --help") +
+         '\n';
 }
 
 std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
@@ -124,8 +131,8 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
     const std::string kind = option == nullptr ? "" : value_name(*option);
     const std::size_t equals = text.find(" = ");
     if (!kind.empty())
-      text =
-          name + " takes a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
+      text = name + (kind.front() == 'I' ? " takes an " : " takes a ") + kind +
+             (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
   }
   return fmt::format("{}: {}\n{} --help lists the valid arguments\n", command, text, command);
 }

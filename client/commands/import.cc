@@ -244,7 +244,7 @@ Result<Exit> run_import(ImportOptions& options) {
   std::vector<ImportSource> sources;
   const auto bags = std::ranges::count_if(options.tables, is_bag);
   if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
-    return invalid("table", "bags and tables are imported by separate commands");
+    return invalid("recording", "bags and tables are imported by separate commands");
   std::optional<ConvertedBags> converted;
   if (bags > 0) {
     TRY_ASSIGN(sources, converted.emplace().convert(options));
@@ -304,8 +304,8 @@ void add_import(CLI::App& program, Exit& exit) {
   using O = ImportOptions;
   add_command<O>(
       program, exit, "import", "Convert ROS bags and CSV tables into an LCM event log", run_import,
-      {{"table", &O::tables,
-        "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV files; one mission each unless a column names "
+      {{"recording", &O::tables,
+        "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV tables; one mission each unless a column names "
         "them",
         file_of("csv"), required},
        {"--mapping", &O::mapping,
@@ -315,10 +315,11 @@ void add_import(CLI::App& program, Exit& exit) {
         file_of("json")},
        {"--out", &O::out, "LCM event log to write", file_of("lcmlog"), required},
        {"--start", &O::start_utime_us,
-        "UTC (2024-07-18T09:10:45Z) or microseconds since 1970 of the first row, for tables without a date; "
-        "each further table follows the one before, as given",
+        "time of the first row of tables without dates, UTC (2024-07-18T09:10:45Z) or microseconds since "
+        "1970; "
+        "further tables follow in the given order",
         time_value()},
-       {"--pause", &O::pause_s, "seconds between one table and the next, with --start", positive()},
+       {"--pause", &O::pause_s, "time between two tables with --start, s", positive()},
        {"--robot-id", &O::robot_id, "robot id, instead of the mapping's and the robot file's",
         named("ROBOT")},
        {"--force", &O::force, force_help},

@@ -52,7 +52,8 @@ Result<Exit> revoke_key(KeyOptions& options) {
 
 void add_key(CLI::App& program, Exit& exit) {
   using O = KeyOptions;
-  auto& group = add_group(program, "key", "Make and revoke the keys by which robots sign their telemetry");
+  auto& group =
+      add_group(program, "key", "Create, list and revoke the keys with which robots sign their telemetry");
   const Row<O> file{"--file", &O::file, "key file: the daemon's ingest.key_file", file_of("json"), required},
       robot{"robot,--robot-id", &O::robot_id, "robot that signs with the key", named("ROBOT"), required};
   add_command<O>(group, exit, "create",

@@ -66,7 +66,7 @@ std::string value_name(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) return {};
   std::string type = option.get_type_name();
   if (type == "FLOAT") return "NUMBER";
-  return type == "INT" || type == "UINT" ? "COUNT" : type;
+  return type == "INT" || type == "UINT" ? "INTEGER" : type;
 }
 
 std::string command_path(const CLI::App& app) {
@@ -108,7 +108,7 @@ void add_examples(CLI::App& command, const char* examples) {
   std::string footer = "Examples:\n  ";
   for (const char* c = examples; *c != '\0'; ++c)
     footer += *c == '\n' ? std::string("\n  ") : std::string(1, *c);
-  command.footer(footer + "\n\nExit codes: joulecast --help");
+  command.footer(footer + "\n\n");
 }
 
 CLI::App& add_group(CLI::App& parent, const char* name, const char* help) {

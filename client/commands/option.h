@@ -53,7 +53,7 @@ struct Excludes {
   const char* option;
 };
 
-// "NUMBER", "COUNT" or the name of the option's Value; empty for a flag.
+// "NUMBER", "INTEGER" or the name of the option's Value; empty for a flag.
 [[nodiscard]] std::string value_name(const CLI::Option& option);
 
 // "gap trial" of that subcommand; empty for the program itself.
@@ -174,6 +174,6 @@ void add_example(CLI::App& command, const char* request);
 
 inline constexpr const char
     *from_help = "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970",
-    *to_help = "started before, the same; a day alone is in it";
+    *to_help = "started before, in the same forms; a date without a time includes that day";
 
 }  // namespace joulecast::client

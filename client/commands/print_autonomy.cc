@@ -44,10 +44,12 @@ void print_plan(const Json& plan, const std::string& unit) {
   const auto energy = [&](const Json& of, const char* name) {
     return energy_text(number_at(of, name), unit);
   };
-  fmt::print("\nPlan: {} to finish with the reserve; {} {} expected ({} to {} {} at 5 and 95 %), {}\n",
-             probability(number_at(plan, "success_probability")), energy(plan, "expected_energy_j"), unit,
-             energy(plan["energy_j"], "p05"), energy(plan["energy_j"], "p95"), unit,
-             span(number_at(plan, "duration_s")));
+  fmt::print(
+      "\nPlan: probability {} of finishing with the reserve; {} {} expected ({} to {} {} at 5 and 95 %), "
+      "{}\n",
+      probability(number_at(plan, "success_probability")), energy(plan, "expected_energy_j"), unit,
+      energy(plan["energy_j"], "p05"), energy(plan["energy_j"], "p95"), unit,
+      span(number_at(plan, "duration_s")));
   Json stages = plan["legs"];
   int index = 0;
   for (Json& leg : stages) leg["title"] = fmt::format("{:>3} {}", ++index, leg.value("task_id", ""));
@@ -66,7 +68,7 @@ void print_plan(const Json& plan, const std::string& unit) {
                       charge("5 %", "p05"),
                       charge("charge", "p50"),
                       charge("95 %", "p95"),
-                      {"reserve", "", 0, 1,
+                      {"success", "", 0, 1,
                        [](const Json& s) { return probability(number_at(s, "success_probability")); }}});
   if (plan["fails_at"].is_object()) fmt::print("It probably fails {}.\n", where(plan["fails_at"]));
   if (!plan["fails_at"].is_object() && plan["likeliest_failure"].is_object() &&
@@ -111,7 +113,7 @@ void print_one(const Json& a, const std::string& unit) {
   if (basis == "recent_missions")
     fmt::print("{} of this robot", count_of(c.value("missions", std::size_t{0}), "mission"));
   else
-    fmt::print("{}", basis == "model" ? "its model: no missions yet" : "missions of robots of its kind");
+    fmt::print("{}", basis == "model" ? "its model (no missions yet)" : "missions of robots of its kind");
   if (c.value("siblings_pending", false)) fmt::print("; missions of robots of its kind are still being read");
   if (const Json& limitation = a["pace"]["limitation"]; limitation.is_string())
     fmt::print("\n{}", limitation.get<std::string>());
@@ -129,7 +131,8 @@ void print_one(const Json& a, const std::string& unit) {
   if (const Json& best = a["minimum_energy"]; best.is_object()) {
     const double saved_s = number_at(best, "saved_s");
     fmt::print(
-        "With minimum-energy profiles: {} to finish, {} {} ({} {} less), {} {}; charge {} at the end.\n",
+        "With minimum-energy profiles: probability {} of finishing, {} {} ({} {} less), {} {}; charge {} at "
+        "the end.\n",
         probability(number_at(best, "success_probability")),
         energy_text(number_at(best, "expected_energy_j"), unit), unit,
         energy_text(number_at(best, "saved_j"), unit), unit, span(std::fabs(saved_s)),

@@ -1,5 +1,3 @@
-#include "client/virtual_robot/simulate.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -31,6 +29,7 @@
 #include "client/interrupt.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
+#include "client/virtual_robot/truth.h"
 #include "signals/ids.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"

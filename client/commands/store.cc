@@ -122,20 +122,23 @@ Result<Exit> stats(StoreOptions& options) {
 
 void add_store(CLI::App& program, Exit& exit) {
   using O = StoreOptions;
-  auto& group = add_group(program, "store", "Copy, verify and count whole histories that no daemon has open");
+  auto& group =
+      add_group(program, "store", "Copy, verify or summarise a whole history that no daemon has open");
   const auto place = [](const char* name, std::string O::*member, const char* help) {
     return Row<O>{name, member, help, file_of("db"), required};
   };
   constexpr const char* which = "SQLite file, sqlite:PATH or postgresql://...";
   const Row<O> store = place("--store", &O::from, which),
                json{"--json", &O::json, "print the report as JSON"};
-  add_command<O>(
-      group, exit, "copy", "Copy every table into another database; continue an interrupted copy", copy,
-      {place("--from", &O::from, which), place("--to", &O::to, "likewise; created if absent"), json},
-      "joulecast store copy --from history.db --to copy.db");
-  add_command<O>(group, exit, "verify", "Read everything: records, the sums of ledgers, chunks of telemetry",
-                 verify_store, {store, json}, "joulecast store verify --store history.db");
-  add_command<O>(group, exit, "stats", "Rows, bytes and checksums of every table", stats, {store, json},
+  add_command<O>(group, exit, "copy", "Copy every table into another database; continue an interrupted copy",
+                 copy,
+                 {place("--from", &O::from, which),
+                  place("--to", &O::to, "the same; created if it does not exist"), json},
+                 "joulecast store copy --from history.db --to copy.db");
+  add_command<O>(group, exit, "verify",
+                 "Read and check everything: records, the sums of ledgers, chunks of telemetry", verify_store,
+                 {store, json}, "joulecast store verify --store history.db");
+  add_command<O>(group, exit, "stats", "Print rows, bytes and checksums of every table", stats, {store, json},
                  "joulecast store stats --store history.db --json");
 }
 

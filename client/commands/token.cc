@@ -97,7 +97,7 @@ Result<Exit> revoke_token(TokenOptions& options) {
 
 void add_token(CLI::App& program, Exit& exit) {
   using O = TokenOptions;
-  auto& group = add_group(program, "token", "Make and revoke the tokens that a joulecastd requires");
+  auto& group = add_group(program, "token", "Create, list and revoke the tokens that joulecastd requires");
   const Row<O> file{"--file", &O::file, "token file: the daemon's auth.token_file", file_of("json"),
                     required};
   add_command<O>(
@@ -106,7 +106,7 @@ void add_token(CLI::App& program, Exit& exit) {
        {"--name", &O::name, "name of the client that uses it, shown in the audit", named("NAME"), required},
        {"--role", &O::role,
         "read; plan: also plans and forecasts; operate: also adopts models and runs diagnoses; admin: also "
-        "gives robots their models",
+        "adds and removes robots",
         one_of({"read", "plan", "operate", "admin"})},
        {"--robots", &O::robots, "shell pattern of robot ids, such as amr-*; default: all", named("PATTERN")},
        {"--days", &O::days, "days until it expires; 0: never", between(0.0, 36500.0)}},
@@ -115,7 +115,7 @@ void add_token(CLI::App& program, Exit& exit) {
   add_command<O>(group, exit, "list", "List the tokens, without their secrets", list_tokens, {file},
                  "joulecast token list --file tokens.json");
   add_command<O>(group, exit, "revoke", "Remove a token: requests with it are refused from now on",
-                 revoke_token, {file, {"--name", &O::name, "the token's", named("NAME"), required}},
+                 revoke_token, {file, {"--name", &O::name, "name of the token", named("NAME"), required}},
                  "joulecast token revoke --file tokens.json --name yard");
 }
 

@@ -63,13 +63,8 @@ constexpr auto table = std::to_array<EffectEntry>({
     {"grade", &I::grade, "1", 0.2, false},
     {"x_cpu_load", &I::x_cpu_load, "W", 600, true},
 });
-constexpr std::size_t published = 2;
 
 }  // namespace
-
-std::span<const EffectEntry> effect_table() {
-  return std::span(table).first(table.size() - published);
-}
 
 std::span<const EffectEntry> all_effects() {
   return table;

@@ -98,9 +98,7 @@ struct EffectEntry {
   bool outside;           // beyond the catalogue
 };
 
-// The effects that are injected without being published, from which trials draw.
-[[nodiscard]] std::span<const EffectEntry> effect_table();
-// Those and the effects with a cause that the robot can publish: every injectable effect.
+// Every injectable effect.
 [[nodiscard]] std::span<const EffectEntry> all_effects();
 
 using EffectStrength = std::pair<std::string, double>;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "client/virtual_robot/pilot.h"
+
 namespace joulecast::virtual_robot {
 namespace {
 
@@ -15,11 +17,6 @@ constexpr double longest_leg_m = 9;
 
 double draw_payload(const RobotParameters& robot, Rng& rng) {
   return robot.payload_limit_kg * payload_fractions[rng.index(payload_fractions.size())];
-}
-
-double ramped_duration(double distance, double speed, double acceleration) {
-  const double ramps = speed * speed / acceleration;
-  return distance > ramps ? distance / speed + speed / acceleration : 2 * std::sqrt(distance / acceleration);
 }
 
 // Speeds and accelerations over the robot's whole permitted range, so that friction laws, inertia and losses
@@ -33,8 +30,9 @@ Pace draw_pace(const RobotParameters& robot, const ScriptOptions& options, Rng& 
           robot.acceleration_limit_m_s2 * rng.uniform(options.gentlest_fraction, options.hardest_fraction)};
 }
 
-}  // namespace
-
+// The drive of thesis (3-1): empty, straight there and back at constant speeds from a tenth to nine tenths of
+// the limit, each held for two seconds or as long as the floor allows. Begins and ends at `pose`, facing the
+// farthest wall's corner.
 MissionScript plan_manoeuvre(const RobotParameters& robot, const ScriptOptions& options, ScriptPose& pose) {
   MissionScript script;
   const double reach_m = options.map_half_width_m - options.clearance_m;
@@ -61,6 +59,8 @@ MissionScript plan_manoeuvre(const RobotParameters& robot, const ScriptOptions& 
   pose.heading_rad = std::atan2(start_y - corner_y, start_x - corner_x);
   return script;
 }
+
+}  // namespace
 
 MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& options, ScriptPose& pose,
                            Rng& rng) {
@@ -90,9 +90,9 @@ MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& op
     script.legs.emplace_back(TurnTo{x, y, rate, acceleration});
     const Pace pace = draw_pace(robot, options, rng);
     script.legs.emplace_back(GoTo{x, y, pace.speed_m_s, pace.acceleration_m_s2});
-    duration_s +=
-        ramped_duration(std::abs(turn), rate, acceleration) +
-        ramped_duration(std::hypot(x - pose.x_m, y - pose.y_m), pace.speed_m_s, pace.acceleration_m_s2);
+    duration_s += Trapezoid(std::abs(turn), rate, acceleration).duration_s() +
+                  Trapezoid(std::hypot(x - pose.x_m, y - pose.y_m), pace.speed_m_s, pace.acceleration_m_s2)
+                      .duration_s();
     pose = {x, y, heading};
   };
 
@@ -115,7 +115,7 @@ MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& op
       pace.speed_m_s =
           std::min(pace.speed_m_s, 0.95 * robot.speed_limit_m_s / (1 + robot.half_track_m / radius));
       script.legs.emplace_back(Arc{radius, angle, pace.speed_m_s, pace.acceleration_m_s2});
-      duration_s += ramped_duration(radius * std::abs(angle), pace.speed_m_s, pace.acceleration_m_s2);
+      duration_s += Trapezoid(radius * std::abs(angle), pace.speed_m_s, pace.acceleration_m_s2).duration_s();
       pose = end;
       return true;
     }

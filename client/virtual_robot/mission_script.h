@@ -62,12 +62,6 @@ struct ScriptPose {
   double x_m = 0, y_m = 0, heading_rad = 0;
 };
 
-// The drive of thesis (3-1): empty, straight there and back at constant speeds from a tenth to nine tenths of
-// the limit, each held for two seconds or as long as the floor allows. Begins and ends at `pose`, facing the
-// farthest wall's corner.
-[[nodiscard]] MissionScript plan_manoeuvre(const RobotParameters& robot, const ScriptOptions& options,
-                                           ScriptPose& pose);
-
 // A mission that stays within the walls, planned from `pose`, which moves on to its end.
 [[nodiscard]] MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& options,
                                          ScriptPose& pose, Rng& rng);

@@ -63,24 +63,23 @@ void Pilot::begin_leg(double x_m, double y_m, double heading_rad) {
   time_s_ = 0;
   begun_ = true;
   profile_ = {};
-  const double settled = settle_s_;
+  const auto over = [&](double way, double speed, double acceleration) {
+    profile_ = {way, speed, acceleration, smooth_ramps_};
+    return profile_.duration_s() + settle_s_;
+  };
   duration_s_ = std::visit(
       Overloaded{[&](const GoTo& leg) {
-                   profile_ = {std::hypot(leg.x_m - x_m, leg.y_m - y_m), leg.speed_m_s, leg.acceleration_m_s2,
-                               smooth_ramps_};
-                   return profile_.duration_s() + settled;
+                   return over(std::hypot(leg.x_m - x_m, leg.y_m - y_m), leg.speed_m_s,
+                               leg.acceleration_m_s2);
                  },
                  [&](const TurnTo& leg) {
                    const double turn = wrapped(std::atan2(leg.y_m - y_m, leg.x_m - x_m) - heading_rad);
                    turn_sign_ = turn < 0 ? -1 : 1;
-                   profile_ = {std::abs(turn), leg.rate_rad_s, leg.acceleration_rad_s2, smooth_ramps_};
-                   return profile_.duration_s() + settled;
+                   return over(std::abs(turn), leg.rate_rad_s, leg.acceleration_rad_s2);
                  },
                  [&](const Arc& leg) {
                    turn_sign_ = leg.angle_rad < 0 ? -1 : 1;
-                   profile_ = {leg.radius_m * std::abs(leg.angle_rad), leg.speed_m_s, leg.acceleration_m_s2,
-                               smooth_ramps_};
-                   return profile_.duration_s() + settled;
+                   return over(leg.radius_m * std::abs(leg.angle_rad), leg.speed_m_s, leg.acceleration_m_s2);
                  },
                  [&](const Dwell& leg) { return leg.duration_s; },
                  [&](const Load& leg) {

@@ -1,7 +1,6 @@
 #include "client/virtual_robot/plant.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -257,18 +256,6 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
 }
 
 namespace {
-
-// Every member of the two structs is a double, so that the integrator may treat them as arrays.
-template <class T>
-using Flat = std::array<double, sizeof(T) / sizeof(double)>;
-
-template <class T>
-T moved(const T& from, const T& rate, double by) {
-  auto a = std::bit_cast<Flat<T>>(from);
-  const auto r = std::bit_cast<Flat<T>>(rate);
-  for (std::size_t k = 0; k < a.size(); ++k) a[k] += by * r[k];
-  return std::bit_cast<T>(a);
-}
 
 template <class T>
 void move_weighted(T& state, const T& a, const T& b, const T& c, const T& d, double step_s) {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 #include <vector>
 
@@ -75,6 +77,16 @@ struct PlantAccounts {
   double slip = 0;
   double potential = 0;  // against the slope
 };
+
+// from + by * rate, member by member, of a struct of doubles.
+template <class T>
+T moved(const T& from, const T& rate, double by) {
+  using Flat = std::array<double, sizeof(T) / sizeof(double)>;
+  auto a = std::bit_cast<Flat>(from);
+  const auto r = std::bit_cast<Flat>(rate);
+  for (std::size_t k = 0; k < a.size(); ++k) a[k] += by * r[k];
+  return std::bit_cast<T>(a);
+}
 
 // The body, wheels and motors of a differential-drive robot, driven by the two armature voltages.
 // Equations of motion from the kinetic energy of body and wheels without lateral slip, with the centre of

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "base/text_file.h"
 #include "base/try.h"
@@ -18,18 +19,11 @@ class Reader {
  public:
   explicit Reader(const Json& document) : document_(document) {}
 
-  double number(const std::string& pointer, Sign sign) {
+  double number(const std::string& pointer, Sign sign, std::optional<double> fallback = std::nullopt) {
     const Json* value = find(pointer);
-    if (value == nullptr) {
-      report(pointer, "is missing");
-      return 1;
-    }
-    return check(pointer, *value, sign);
-  }
-
-  double number_or(const std::string& pointer, Sign sign, double fallback) {
-    const Json* value = find(pointer);
-    return value == nullptr ? fallback : check(pointer, *value, sign);
+    if (value != nullptr) return check(pointer, *value, sign);
+    if (!fallback) report(pointer, "is missing");
+    return fallback.value_or(1);
   }
 
   const Json* find(const std::string& pointer) const {
@@ -76,18 +70,18 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   }
   p.wheel_radius_m = in.number("/kinematics/wheel_radius_m", Sign::positive);
   p.half_track_m = in.number("/kinematics/half_track_m", Sign::positive);
-  p.com_offset_m = in.number_or("/kinematics/com_offset_m", Sign::any, 0);
+  p.com_offset_m = in.number("/kinematics/com_offset_m", Sign::any, 0);
   p.chassis_kg = in.number("/mass/chassis_kg", Sign::positive);
-  p.wheel_kg = in.number_or("/mass/wheel_kg", Sign::not_negative, 0);
+  p.wheel_kg = in.number("/mass/wheel_kg", Sign::not_negative, 0);
   p.yaw_inertia_kg_m2 = in.number("/mass/yaw_inertia_kg_m2", Sign::positive);
-  p.wheel_inertia_kg_m2 = in.number_or("/mass/wheel_inertia_kg_m2", Sign::not_negative, 0) +
-                          in.number_or("/motor/rotor_inertia_kg_m2", Sign::not_negative, 0);
+  p.wheel_inertia_kg_m2 = in.number("/mass/wheel_inertia_kg_m2", Sign::not_negative, 0) +
+                          in.number("/motor/rotor_inertia_kg_m2", Sign::not_negative, 0);
   p.resistance_ohm = in.number("/motor/resistance_ohm", Sign::positive);
-  p.inductance_h = in.number_or("/motor/inductance_h", Sign::not_negative, 0);
+  p.inductance_h = in.number("/motor/inductance_h", Sign::not_negative, 0);
   p.torque_constant_nm_a = in.number("/motor/torque_constant_nm_a", Sign::positive);
   p.voltage_constant_v_s_rad = in.number("/motor/voltage_constant_v_s_rad", Sign::positive);
-  p.gear_ratio = in.number_or("/motor/gear_ratio", Sign::positive, 1);
-  p.viscous_friction_nm_s_rad = in.number_or("/motor/viscous_friction_nm_s_rad", Sign::not_negative, 0);
+  p.gear_ratio = in.number("/motor/gear_ratio", Sign::positive, 1);
+  p.viscous_friction_nm_s_rad = in.number("/motor/viscous_friction_nm_s_rad", Sign::not_negative, 0);
   const Json* friction = in.find("/motor/friction_torque_nm");
   if (friction == nullptr || !friction->is_array() || friction->size() != 2) {
     in.report("/motor/friction_torque_nm", "must be [right, left]");
@@ -100,7 +94,7 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.nominal_voltage_v = in.number("/battery/nominal_voltage_v", Sign::positive);
   p.capacity_ah = in.number("/battery/capacity_ah", Sign::positive);
   p.internal_resistance_ohm = in.number("/battery/internal_resistance_ohm", Sign::not_negative);
-  p.capacity_ah *= in.number_or("/battery/ageing_factor", Sign::positive, 1);
+  p.capacity_ah *= in.number("/battery/ageing_factor", Sign::positive, 1);
   if (in.find("/battery/open_circuit_voltage") != nullptr) {
     const std::string at = "/battery/open_circuit_voltage";
     const Json* charge = in.find(at + "/charge");
@@ -119,12 +113,12 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
       }
     }
   }
-  p.idle_power_w = in.number_or("/idle_power_w", Sign::not_negative, 0);
+  p.idle_power_w = in.number("/idle_power_w", Sign::not_negative, 0);
   p.speed_limit_m_s = in.number("/limits/speed_m_s", Sign::positive);
   p.acceleration_limit_m_s2 = in.number("/limits/acceleration_m_s2", Sign::positive);
   p.yaw_rate_limit_rad_s = in.number("/limits/yaw_rate_rad_s", Sign::positive);
   p.current_limit_a = in.number("/limits/current_a", Sign::positive);
-  p.payload_limit_kg = in.number_or("/limits/payload_kg", Sign::not_negative, 0);
+  p.payload_limit_kg = in.number("/limits/payload_kg", Sign::not_negative, 0);
   if (const Json* effects = in.find("/effects"); effects != nullptr && !effects->empty()) {
     in.report("/effects", "must be empty: a virtual robot's imperfections are given with --effect");
   }

@@ -1,7 +1,6 @@
 #include "client/virtual_robot/virtual_robot.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -21,14 +20,6 @@ constexpr double scatter_idle = 0.010;
 constexpr std::int64_t load_periods = 400;  // control periods after which the computer's load is another one
 constexpr double load_pull = 0.1;           // back to one half
 constexpr double load_step = 0.15;
-
-PlantAccounts difference(const PlantAccounts& a, const PlantAccounts& b) {
-  using Flat = std::array<double, sizeof(PlantAccounts) / sizeof(double)>;
-  auto x = std::bit_cast<Flat>(a);
-  const auto y = std::bit_cast<Flat>(b);
-  for (std::size_t k = 0; k < x.size(); ++k) x[k] -= y[k];
-  return std::bit_cast<PlantAccounts>(x);
-}
 
 }  // namespace
 
@@ -111,7 +102,7 @@ void VirtualRobot::start_mission() {
 
 void VirtualRobot::finish_mission() {
   under_way_ = false;
-  mission_.accounts = difference(plant_.accounts(), accounts_at_start_);
+  mission_.accounts = moved(plant_.accounts(), accounts_at_start_, -1);
   mission_.charge_at_end = pack_.state_of_charge();
   outbox_.push_back(
       {now_us(), signals::MissionEvent{now_us(), mission_.mission_id, signals::MissionPhase::finished,

@@ -109,8 +109,8 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
 }
 
 std::string_view words_of(drift::Quantity quantity) {
-  return quantity == drift::Quantity::mass ? "Mass by its accelerations"
-                                           : "Internal resistance of its battery";
+  return quantity == drift::Quantity::mass ? "Its mass, estimated from accelerations,"
+                                           : "The internal resistance of its battery";
 }
 
 void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding& found,
@@ -120,11 +120,12 @@ void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding
   };
   if (found.change && found.change->model_version == version_in_force) {
     const drift::Mark& mark = *found.change;
-    std::string what = "Uses " + change(mark.change()) + " than";
-    if (mark.quantity != drift::Quantity::energy)
-      what = fmt::format("{} {:+.1f} % against", words_of(mark.quantity), 100 * mark.change());
+    const std::string day = utc_text(mark.utime_us).substr(0, 10);
     reasons.push_back({"drift", Severity::warning, mark.utime_us,
-                       fmt::format("{} before {}.", what, utc_text(mark.utime_us).substr(0, 10)),
+                       mark.quantity == drift::Quantity::energy
+                           ? fmt::format("Uses {} than before {}.", change(mark.change()), day)
+                           : fmt::format("{} has changed by {:+.1f} % since {}.", words_of(mark.quantity),
+                                         100 * mark.change(), day),
                        "Start a diagnosis, or compare it with robots of its kind.",
                        std::to_string(mark.utime_us)});
   }

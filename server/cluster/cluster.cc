@@ -1,19 +1,10 @@
 #include "server/cluster/cluster.h"
 
 #include <algorithm>
-#include <condition_variable>
-#include <limits>
-#include <map>
-#include <mutex>
-#include <optional>
-#include <set>
-#include <thread>
 #include <utility>
-#include <vector>
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
-#include "history/leases.h"
 #include "ingest/snapshot_bytes.h"
 #include "robot/robot_file.h"
 #include "server/cluster/assignment.h"
@@ -155,334 +146,287 @@ class Exchange {
   std::uint64_t turns_ = 0;
 };
 
-class Cluster::Impl {
- public:
-  Impl(ClusterOptions options, Parts parts) : options_(std::move(options)), parts_(std::move(parts)) {
-    status_.name = options_.name;
-    status_.node = options_.node;
-  }
-
-  ~Impl() { leave(); }
-
-  Result<void> start(const std::string& address) {
-    leases_ = std::make_unique<history::Leases>(
-        history::LeaseOptions{options_.url, options_.name, options_.node, address, JOULECAST_VERSION,
-                              options_.writer, options_.lifetime});
-    // One that was killed a moment ago had this name.
-    Result<void> joined = leases_->join();
-    for (const auto until = Clock::now() + options_.lifetime + gone_patience;
-         !joined && joined.error().fault == Fault::conflict && Clock::now() < until; joined = leases_->join())
-      std::this_thread::sleep_for(turn_period);
-    if (!joined) return joined;
-    {
-      const std::lock_guard lock(mutex_);
-      renewed_ = steady_since_ = Clock::now();
-      running_ = true;
-    }
-    keeper_ = std::thread([this] { keep(); });
-    exchanger_ = std::thread([this] { exchange(); });
-    return {};
-  }
-
-  void settle_down() {
-    std::unique_lock lock(mutex_);
-    settling_ = true;
-    wake_.wait_for(lock, settling_patience, [this] { return settled_ || !running_; });
-    settled_ = true;
-  }
-
-  void leave() {
-    {
-      const std::lock_guard lock(mutex_);
-      if (!std::exchange(running_, false)) return;
-    }
-    wake_.notify_all();
-    keeper_.join();
-    exchanger_.join();
-    if (const Result<void> left = leases_->leave(); !left)
-      parts_.note("the cluster was not notified that this daemon leaves: " + describe(left.error()));
-  }
-
-  ClusterStatus status() const {
-    const std::lock_guard lock(mutex_);
-    ClusterStatus now = status_;
-    now.read_s = seconds_since(read_);
-    now.renewed_s = seconds_since(renewed_);
-    now.kept = parts_.keeping.kept().size();
-    now.resumed_missions = parts_.keeping.resumed_missions;
-    now.replayed_messages = parts_.keeping.replayed_messages;
-    now.dropped_commands = parts_.store.fenced();
-    now.held_messages = parts_.keeping.held_messages;
-    now.held_bytes = parts_.keeping.held_bytes;
-    now.held_dropped = parts_.keeping.held_dropped;
-    return now;
-  }
-
-  bool is_first() const {
-    const std::lock_guard lock(mutex_);
-    for (const history::Member& member : status_.state.members)
-      if (member.expires_in_s > 0) return member.node == options_.node;
-    return true;
-  }
-
-  void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
-    parts_.keeping.withdraw({robot_id, epoch, false});
-    const std::lock_guard lock(mutex_);
-    if (reported_dropped_ && Clock::now() - *reported_dropped_ < std::chrono::minutes(1)) return;
-    reported_dropped_ = Clock::now();
-    parts_.note(std::to_string(count) + " commands for " + robot_id +
-                " were dropped: another daemon keeps it since");
-  }
-
- private:
-  bool wait(milliseconds period) {
-    std::unique_lock lock(mutex_);
-    wake_.wait_for(lock, period, [this] { return !running_; });
-    return running_;
-  }
-
-  void keep() {
-    for (bool again = true; again || wait(turn_period);) {
-      again = false;
-      survive("cluster leases", [&] {
-        const Result<bool> turned = turn();
-        note(turned ? Result<void>() : tl::unexpected(turned.error()));
-        again = turned.value_or(false);
-      });
-    }
-  }
-
-  void note(const Result<void>& done) {
-    std::string text;
-    {
-      const std::lock_guard lock(mutex_);
-      const std::string why = done ? std::string() : describe(done.error());
-      if (!done) steady_since_.reset();
-      if (why.empty() != status_.error.empty())
-        text =
-            done ? "the cluster's leases are renewed again" : "the cluster's leases are not renewed: " + why;
-      status_.error = why;
-    }
-    if (!text.empty()) parts_.note(text);
-  }
-
-  // True when the next turn should follow immediately.
-  Result<bool> turn() {
-    TRY(renew());
-    TRY(publish_heard());
-    TRY_ASSIGN(auto state, leases_->state());
-    ingest::Keeping::Leases leases;
-    for (const history::Lease& lease : state.leases) leases.emplace(lease.robot_id, lease.position);
-    parts_.keeping.note_leases(std::move(leases));
-    {
-      const std::lock_guard lock(mutex_);
-      status_.state = state;
-      read_ = Clock::now();
-      if (!steady_since_) steady_since_ = read_;
-      if (settled_) return false;
-    }
-    const Result<bool> buried = bury(state);
-    if (!buried || *buried) return buried;
-    TRY_ASSIGN(const std::size_t taken, reassign(state));
-    {
-      const std::lock_guard lock(mutex_);
-      if (settling_) {
-        settled_ = taken == 0 && gone_since_.empty();
-        wake_.notify_all();
-        return taken > 0;
-      }
-    }
-    return take_jobs().map([] { return false; });
-  }
-
-  Result<void> renew() {
-    Result<void> renewed = leases_->renew();
-    if (!renewed && renewed.error().fault == Fault::conflict) {
-      // The membership expired. Messages received meanwhile may have gaps, so all earlier ones are discarded.
-      parts_.keeping.withdraw_all();
-      parts_.keeping.forget_heard();
-      said_heard_.clear();
-      {
-        const std::lock_guard lock(mutex_);
-        ++status_.memberships_lost;
-        steady_since_.reset();
-      }
-      parts_.note(
-          "this daemon did not renew its membership, and others keep its robots; it joins the cluster again");
-      renewed = leases_->join();
-    }
-    if (renewed) {
-      const std::lock_guard lock(mutex_);
-      renewed_ = Clock::now();
-    }
-    return renewed;
-  }
-
-  Result<void> publish_heard() {
-    const std::int64_t now = parts_.now_utime_us();
-    std::set<std::string> heard;
-    for (const auto& [robot_id, utime_us] : parts_.keeping.heard()) {
-      const bool kept = parts_.keeping.epoch_of(robot_id) != 0;
-      if (now - utime_us < (kept ? own_heard_us : heard_us)) heard.insert(robot_id);
-    }
-    std::vector<std::string> more, no_longer;
-    for (const std::string& robot_id : heard)
-      if (!said_heard_.contains(robot_id)) more.push_back(robot_id);
-    for (const std::string& robot_id : said_heard_)
-      if (!heard.contains(robot_id)) no_longer.push_back(robot_id);
-    if (more.empty() && no_longer.empty()) return {};
-    Result<void> done = leases_->hear(more, no_longer);
-    if (done) said_heard_ = std::move(heard);
-    return done;
-  }
-
-  // Time of this daemon's uninterrupted access to the database.
-  Clock::duration steadily() const {
-    const std::lock_guard lock(mutex_);
-    return steady_since_ ? Clock::now() - *steady_since_ : Clock::duration::zero();
-  }
-
-  bool is_alive(const history::Member& member) const {
-    if (member.node == options_.node) return true;
-    return member.expires_in_s > 0 && !gone_since_.contains(member.incarnation);
-  }
-
-  // Ends the memberships of daemons that are gone. After the database was away all of them may look so until
-  // they have reached it again.
-  Result<bool> bury(const history::ClusterState& state) {
-    std::map<std::int64_t, Clock::time_point> gone;
-    bool any = false;
-    const auto steady = steadily();
-    for (const history::Member& member : state.members) {
-      if (member.node == options_.node) continue;
-      if (!member.connected) {
-        const auto since = gone_since_.find(member.incarnation);
-        gone.emplace(member.incarnation, since != gone_since_.end() ? since->second : Clock::now());
-      }
-      const bool expired = member.expires_in_s <= 0 && steady > options_.lifetime;
-      const bool cut_off = !member.connected && steady > gone_patience &&
-                           Clock::now() - gone.at(member.incarnation) > gone_patience;
-      if (!expired && !cut_off) continue;
-      TRY_ASSIGN(const bool buried, leases_->bury(member));
-      any |= buried;
-      if (buried)
-        parts_.note("daemon " + member.node + " of the cluster is gone: " +
-                    (cut_off ? "its connection has ended" : "it does not renew its leases"));
-    }
-    gone_since_ = std::move(gone);
-    return any;
-  }
-
-  // Answers how many robots this daemon took.
-  Result<std::size_t> reassign(const history::ClusterState& state) {
-    const Assignment assigned =
-        assign(state, {options_.node, [this](const history::Member& member) { return is_alive(member); },
-                       [this](const history::Lease& lease) { return keeps(lease); }});
-    if (!assigned.take.empty()) {
-      TRY_ASSIGN(const auto taken, leases_->take(assigned.take));
-      for (const history::Lease& lease : taken) {
-        parts_.forecasts.learnt_elsewhere(lease.robot_id);
-        parts_.keeping.grant({lease.robot_id, lease.epoch, lease.position});
-      }
-      count_taken(assigned.take, taken);
-    }
-    for (const history::Lease& lease : assigned.hand_over) {
-      const history::Epoch epoch = parts_.keeping.epoch_of(lease.robot_id);
-      if (epoch != lease.epoch) continue;
-      parts_.keeping.withdraw({lease.robot_id, epoch, true});
-      letting_go_[lease.robot_id] = {epoch, Clock::now()};
-      const std::lock_guard lock(mutex_);
-      ++status_.handovers;
-    }
-    if (!assigned.free.empty()) {
-      TRY(leases_->free(assigned.free));
-    }
-    return assigned.take.size();
-  }
-
-  bool keeps(const history::Lease& lease) {
-    if (parts_.keeping.epoch_of(lease.robot_id) == lease.epoch) return true;
-    const auto found = letting_go_.find(lease.robot_id);
-    return found != letting_go_.end() && found->second.epoch == lease.epoch &&
-           Clock::now() - found->second.since < longest_release;
-  }
-
-  void count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken) {
-    const std::lock_guard lock(mutex_);
-    status_.taken += taken.size();
-    for (const history::Lease& lease : taken) {
-      const auto before = std::ranges::find(seen, lease.robot_id, &history::Lease::robot_id);
-      if (before != seen.end() && !before->node.empty()) ++status_.takeovers;
-    }
-  }
-
-  Result<void> take_jobs() {
-    if (Clock::now() - looked_for_jobs_ < job_period || steadily() < options_.lifetime) return {};
-    looked_for_jobs_ = Clock::now();
-    TRY_ASSIGN(const auto jobs, leases_->take_jobs());
-    for (const std::int64_t id : jobs) parts_.take_job(id);
-    return {};
-  }
-
-  void exchange() {
-    Exchange exchange(options_.node,
-                      std::make_unique<history::SharedState>(options_.url, options_.writer + "-exchange"),
-                      parts_);
-    bool reported = false;
-    do {
-      survive("cluster exchange", [&] {
-        const Result<void> turned = exchange.turn();
-        if (!turned && !reported)
-          parts_.note("live states are not exchanged with the other daemons: " + describe(turned.error()));
-        reported = !turned;
-      });
-    } while (wait(exchange_period));
-  }
-
-  const ClusterOptions options_;
-  const Parts parts_;
-  std::unique_ptr<history::Leases> leases_;
-
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  bool running_ = false, settling_ = false, settled_ = false;
-  ClusterStatus status_;
-  std::optional<Clock::time_point> read_, renewed_, steady_since_;
-  std::optional<Clock::time_point> reported_dropped_;
-
-  // The keeper's own.
-  std::set<std::string> said_heard_;
-  std::map<std::int64_t, Clock::time_point> gone_since_;  // by incarnation
-  Clock::time_point looked_for_jobs_{};
-  struct Release {
-    history::Epoch epoch = 0;
-    Clock::time_point since;
-  };
-  std::map<std::string, Release> letting_go_;  // the last of each robot
-
-  std::thread keeper_, exchanger_;
-};
-
 Cluster::Cluster(ClusterOptions options, Parts parts)
-    : impl_(std::make_unique<Impl>(std::move(options), std::move(parts))) {}
-Cluster::~Cluster() = default;
+    : options_(std::move(options)), parts_(std::move(parts)) {
+  status_.name = options_.name;
+  status_.node = options_.node;
+}
+
+Cluster::~Cluster() {
+  leave();
+}
+
 Result<void> Cluster::start(const std::string& address) {
-  return impl_->start(address);
+  leases_ = std::make_unique<history::Leases>(history::LeaseOptions{options_.url, options_.name,
+                                                                    options_.node, address, JOULECAST_VERSION,
+                                                                    options_.writer, options_.lifetime});
+  // One that was killed a moment ago had this name.
+  Result<void> joined = leases_->join();
+  for (const auto until = Clock::now() + options_.lifetime + gone_patience;
+       !joined && joined.error().fault == Fault::conflict && Clock::now() < until; joined = leases_->join())
+    std::this_thread::sleep_for(turn_period);
+  if (!joined) return joined;
+  {
+    const std::lock_guard lock(mutex_);
+    renewed_ = steady_since_ = Clock::now();
+    running_ = true;
+  }
+  keeper_ = std::thread([this] { keep(); });
+  exchanger_ = std::thread([this] { exchange(); });
+  return {};
 }
+
 void Cluster::settle_down() {
-  impl_->settle_down();
+  std::unique_lock lock(mutex_);
+  settling_ = true;
+  wake_.wait_for(lock, settling_patience, [this] { return settled_ || !running_; });
+  settled_ = true;
 }
+
 void Cluster::leave() {
-  impl_->leave();
+  {
+    const std::lock_guard lock(mutex_);
+    if (!std::exchange(running_, false)) return;
+  }
+  wake_.notify_all();
+  keeper_.join();
+  exchanger_.join();
+  if (const Result<void> left = leases_->leave(); !left)
+    parts_.note("the cluster was not notified that this daemon leaves: " + describe(left.error()));
 }
+
 ClusterStatus Cluster::status() const {
-  return impl_->status();
+  const std::lock_guard lock(mutex_);
+  ClusterStatus now = status_;
+  now.read_s = seconds_since(read_);
+  now.renewed_s = seconds_since(renewed_);
+  now.kept = parts_.keeping.kept().size();
+  now.resumed_missions = parts_.keeping.resumed_missions;
+  now.replayed_messages = parts_.keeping.replayed_messages;
+  now.dropped_commands = parts_.store.fenced();
+  now.held_messages = parts_.keeping.held_messages;
+  now.held_bytes = parts_.keeping.held_bytes;
+  now.held_dropped = parts_.keeping.held_dropped;
+  return now;
 }
+
 bool Cluster::is_first() const {
-  return impl_->is_first();
+  const std::lock_guard lock(mutex_);
+  for (const history::Member& member : status_.state.members)
+    if (member.expires_in_s > 0) return member.node == options_.node;
+  return true;
 }
+
 void Cluster::on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
-  impl_->on_dropped(robot_id, epoch, count);
+  parts_.keeping.withdraw({robot_id, epoch, false});
+  const std::lock_guard lock(mutex_);
+  if (reported_dropped_ && Clock::now() - *reported_dropped_ < std::chrono::minutes(1)) return;
+  reported_dropped_ = Clock::now();
+  parts_.note(std::to_string(count) + " commands for " + robot_id +
+              " were dropped: another daemon keeps it since");
+}
+
+bool Cluster::wait(milliseconds period) {
+  std::unique_lock lock(mutex_);
+  wake_.wait_for(lock, period, [this] { return !running_; });
+  return running_;
+}
+
+void Cluster::keep() {
+  for (bool again = true; again || wait(turn_period);) {
+    again = false;
+    survive("cluster leases", [&] {
+      const Result<bool> turned = turn();
+      note(turned ? Result<void>() : tl::unexpected(turned.error()));
+      again = turned.value_or(false);
+    });
+  }
+}
+
+void Cluster::note(const Result<void>& done) {
+  std::string text;
+  {
+    const std::lock_guard lock(mutex_);
+    const std::string why = done ? std::string() : describe(done.error());
+    if (!done) steady_since_.reset();
+    if (why.empty() != status_.error.empty())
+      text = done ? "the cluster's leases are renewed again" : "the cluster's leases are not renewed: " + why;
+    status_.error = why;
+  }
+  if (!text.empty()) parts_.note(text);
+}
+
+// True when the next turn should follow immediately.
+Result<bool> Cluster::turn() {
+  TRY(renew());
+  TRY(publish_heard());
+  TRY_ASSIGN(auto state, leases_->state());
+  ingest::Keeping::Leases leases;
+  for (const history::Lease& lease : state.leases) leases.emplace(lease.robot_id, lease.position);
+  parts_.keeping.note_leases(std::move(leases));
+  {
+    const std::lock_guard lock(mutex_);
+    status_.state = state;
+    read_ = Clock::now();
+    if (!steady_since_) steady_since_ = read_;
+    if (settled_) return false;
+  }
+  const Result<bool> buried = bury(state);
+  if (!buried || *buried) return buried;
+  TRY_ASSIGN(const std::size_t taken, reassign(state));
+  {
+    const std::lock_guard lock(mutex_);
+    if (settling_) {
+      settled_ = taken == 0 && gone_since_.empty();
+      wake_.notify_all();
+      return taken > 0;
+    }
+  }
+  return take_jobs().map([] { return false; });
+}
+
+Result<void> Cluster::renew() {
+  Result<void> renewed = leases_->renew();
+  if (!renewed && renewed.error().fault == Fault::conflict) {
+    // The membership expired. Messages received meanwhile may have gaps, so all earlier ones are discarded.
+    parts_.keeping.withdraw_all();
+    parts_.keeping.forget_heard();
+    said_heard_.clear();
+    {
+      const std::lock_guard lock(mutex_);
+      ++status_.memberships_lost;
+      steady_since_.reset();
+    }
+    parts_.note(
+        "this daemon did not renew its membership, and others keep its robots; it joins the cluster again");
+    renewed = leases_->join();
+  }
+  if (renewed) {
+    const std::lock_guard lock(mutex_);
+    renewed_ = Clock::now();
+  }
+  return renewed;
+}
+
+Result<void> Cluster::publish_heard() {
+  const std::int64_t now = parts_.now_utime_us();
+  std::set<std::string> heard;
+  for (const auto& [robot_id, utime_us] : parts_.keeping.heard()) {
+    const bool kept = parts_.keeping.epoch_of(robot_id) != 0;
+    if (now - utime_us < (kept ? own_heard_us : heard_us)) heard.insert(robot_id);
+  }
+  std::vector<std::string> more, no_longer;
+  for (const std::string& robot_id : heard)
+    if (!said_heard_.contains(robot_id)) more.push_back(robot_id);
+  for (const std::string& robot_id : said_heard_)
+    if (!heard.contains(robot_id)) no_longer.push_back(robot_id);
+  if (more.empty() && no_longer.empty()) return {};
+  Result<void> done = leases_->hear(more, no_longer);
+  if (done) said_heard_ = std::move(heard);
+  return done;
+}
+
+// Time of this daemon's uninterrupted access to the database.
+Clock::duration Cluster::steadily() const {
+  const std::lock_guard lock(mutex_);
+  return steady_since_ ? Clock::now() - *steady_since_ : Clock::duration::zero();
+}
+
+bool Cluster::is_alive(const history::Member& member) const {
+  if (member.node == options_.node) return true;
+  return member.expires_in_s > 0 && !gone_since_.contains(member.incarnation);
+}
+
+// Ends the memberships of daemons that are gone. After the database was away all of them may look so until
+// they have reached it again.
+Result<bool> Cluster::bury(const history::ClusterState& state) {
+  std::map<std::int64_t, Clock::time_point> gone;
+  bool any = false;
+  const auto steady = steadily();
+  for (const history::Member& member : state.members) {
+    if (member.node == options_.node) continue;
+    if (!member.connected) {
+      const auto since = gone_since_.find(member.incarnation);
+      gone.emplace(member.incarnation, since != gone_since_.end() ? since->second : Clock::now());
+    }
+    const bool expired = member.expires_in_s <= 0 && steady > options_.lifetime;
+    const bool cut_off = !member.connected && steady > gone_patience &&
+                         Clock::now() - gone.at(member.incarnation) > gone_patience;
+    if (!expired && !cut_off) continue;
+    TRY_ASSIGN(const bool buried, leases_->bury(member));
+    any |= buried;
+    if (buried)
+      parts_.note("daemon " + member.node + " of the cluster is gone: " +
+                  (cut_off ? "its connection has ended" : "it does not renew its leases"));
+  }
+  gone_since_ = std::move(gone);
+  return any;
+}
+
+// Answers how many robots this daemon took.
+Result<std::size_t> Cluster::reassign(const history::ClusterState& state) {
+  const Assignment assigned =
+      assign(state, {options_.node, [this](const history::Member& member) { return is_alive(member); },
+                     [this](const history::Lease& lease) { return keeps(lease); }});
+  if (!assigned.take.empty()) {
+    TRY_ASSIGN(const auto taken, leases_->take(assigned.take));
+    for (const history::Lease& lease : taken) {
+      parts_.forecasts.learnt_elsewhere(lease.robot_id);
+      parts_.keeping.grant({lease.robot_id, lease.epoch, lease.position});
+    }
+    count_taken(assigned.take, taken);
+  }
+  for (const history::Lease& lease : assigned.hand_over) {
+    const history::Epoch epoch = parts_.keeping.epoch_of(lease.robot_id);
+    if (epoch != lease.epoch) continue;
+    parts_.keeping.withdraw({lease.robot_id, epoch, true});
+    letting_go_[lease.robot_id] = {epoch, Clock::now()};
+    const std::lock_guard lock(mutex_);
+    ++status_.handovers;
+  }
+  if (!assigned.free.empty()) {
+    TRY(leases_->free(assigned.free));
+  }
+  return assigned.take.size();
+}
+
+bool Cluster::keeps(const history::Lease& lease) {
+  if (parts_.keeping.epoch_of(lease.robot_id) == lease.epoch) return true;
+  const auto found = letting_go_.find(lease.robot_id);
+  return found != letting_go_.end() && found->second.epoch == lease.epoch &&
+         Clock::now() - found->second.since < longest_release;
+}
+
+void Cluster::count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken) {
+  const std::lock_guard lock(mutex_);
+  status_.taken += taken.size();
+  for (const history::Lease& lease : taken) {
+    const auto before = std::ranges::find(seen, lease.robot_id, &history::Lease::robot_id);
+    if (before != seen.end() && !before->node.empty()) ++status_.takeovers;
+  }
+}
+
+Result<void> Cluster::take_jobs() {
+  if (Clock::now() - looked_for_jobs_ < job_period || steadily() < options_.lifetime) return {};
+  looked_for_jobs_ = Clock::now();
+  TRY_ASSIGN(const auto jobs, leases_->take_jobs());
+  for (const std::int64_t id : jobs) parts_.take_job(id);
+  return {};
+}
+
+void Cluster::exchange() {
+  Exchange exchange(options_.node,
+                    std::make_unique<history::SharedState>(options_.url, options_.writer + "-exchange"),
+                    parts_);
+  bool reported = false;
+  do {
+    survive("cluster exchange", [&] {
+      const Result<void> turned = exchange.turn();
+      if (!turned && !reported)
+        parts_.note("live states are not exchanged with the other daemons: " + describe(turned.error()));
+      reported = !turned;
+    });
+  } while (wait(exchange_period));
 }
 
 }  // namespace joulecast::server

@@ -1,11 +1,18 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "base/error.h"
 #include "history/leases.h"
@@ -80,8 +87,45 @@ class Cluster {
   void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count);
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  using Clock = std::chrono::steady_clock;
+  struct Release {
+    history::Epoch epoch = 0;
+    Clock::time_point since;
+  };
+
+  bool wait(std::chrono::milliseconds period);
+  void keep();
+  void note(const Result<void>& done);
+  Result<bool> turn();
+  Result<void> renew();
+  Result<void> publish_heard();
+  Clock::duration steadily() const;
+  bool is_alive(const history::Member& member) const;
+  Result<bool> bury(const history::ClusterState& state);
+  Result<std::size_t> reassign(const history::ClusterState& state);
+  bool keeps(const history::Lease& lease);
+  void count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken);
+  Result<void> take_jobs();
+  void exchange();
+
+  const ClusterOptions options_;
+  const Parts parts_;
+  std::unique_ptr<history::Leases> leases_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool running_ = false, settling_ = false, settled_ = false;
+  ClusterStatus status_;
+  std::optional<Clock::time_point> read_, renewed_, steady_since_;
+  std::optional<Clock::time_point> reported_dropped_;
+
+  // The keeper's own.
+  std::set<std::string> said_heard_;
+  std::map<std::int64_t, Clock::time_point> gone_since_;  // by incarnation
+  Clock::time_point looked_for_jobs_{};
+  std::map<std::string, Release> letting_go_;  // the last of each robot
+
+  std::thread keeper_, exchanger_;
 };
 
 }  // namespace joulecast::server

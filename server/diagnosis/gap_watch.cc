@@ -70,15 +70,11 @@ GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const i
       options_(options),
       on_error_(std::move(on_error)) {}
 
-GapWatch::~GapWatch() {
-  stop();
-}
-
 void GapWatch::start() {
-  if (options_.period_s > 0) thread_ = std::thread([this] { run(); });
+  if (options_.period_s > 0) thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
-void GapWatch::run() {
+void GapWatch::run(const std::stop_token& stop) {
   const auto period = std::chrono::duration_cast<std::chrono::steady_clock::duration>(
       std::chrono::duration<double>(options_.period_s));
   auto next = std::chrono::steady_clock::now();
@@ -86,8 +82,8 @@ void GapWatch::run() {
     std::set<std::string> ended;
     {
       std::unique_lock lock(mutex_);
-      wake_.wait_until(lock, next, [this] { return stopping_ || !ended_.empty(); });
-      if (stopping_) return;
+      wake_.wait_until(lock, stop, next, [this] { return !ended_.empty(); });
+      if (stop.stop_requested()) return;
       ended.swap(ended_);
     }
     survive("gap watch", [&] {
@@ -110,15 +106,6 @@ void GapWatch::mission_ended(const std::string& robot_id) {
     ended_.insert(robot_id);
   }
   wake_.notify_all();
-}
-
-void GapWatch::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  wake_.notify_all();
-  if (thread_.joinable()) thread_.join();
 }
 
 void GapWatch::record(const std::string& robot_id, const std::string& kind, std::string detail_json) {

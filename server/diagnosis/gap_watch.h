@@ -56,12 +56,11 @@ class GapWatch {
            const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
            std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
            std::function<void(const Error&)> on_error);
-  ~GapWatch();
   GapWatch(const GapWatch&) = delete;
   GapWatch& operator=(const GapWatch&) = delete;
 
   void start();
-  void stop();
+  void stop() { thread_ = {}; }
 
   // Checks all robots, as the schedule does.
   void look();
@@ -77,7 +76,7 @@ class GapWatch {
   std::map<std::string, WatchFinding> findings() const;
 
  private:
-  void run();
+  void run(const std::stop_token& stop);
   void look_at(const std::vector<std::shared_ptr<const ingest::ModelInForce>>& models);
   Result<WatchFinding> find(const ingest::ModelInForce& model) const;
   Result<void> announce_drift(const std::string& robot_id, const drift::Mark& mark);
@@ -98,12 +97,11 @@ class GapWatch {
   std::function<void(const Error&)> on_error_;
   std::mutex looking_;
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable_any wake_;
   std::map<std::string, WatchFinding> findings_;
   std::uint64_t rounds_ = 0, drifts_ = 0;
   std::set<std::string> ended_;  // robots whose missions ended since the last look
-  bool stopping_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace joulecast::server

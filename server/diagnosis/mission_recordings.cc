@@ -9,37 +9,21 @@
 namespace joulecast::server {
 namespace {
 
-Result<std::vector<signals::Sample>> samples_of(const history::Store& store, history::MissionKey key) {
-  std::vector<signals::Sample> samples;
-  history::PageRequest page;
-  page.limit = history::max_telemetry_samples;
+// All pages of a query of a mission's recording.
+template <class Page, class Item>
+Result<std::vector<Item>> all_of(const history::Store& store, history::MissionKey key,
+                                 Result<Page> (history::History::*query)(history::MissionKey,
+                                                                         history::TimeRange,
+                                                                         const history::PageRequest&) const,
+                                 std::vector<Item> Page::*items) {
+  history::PageRequest page{history::max_telemetry_samples, {}};
+  std::vector<Item> all;
   do {
-    TRY_ASSIGN(history::TelemetryPage got, store.telemetry(key, {}, page));
-    if (samples.empty()) {
-      samples = std::move(got.samples);
-    } else {
-      samples.insert(samples.end(), got.samples.begin(), got.samples.end());
-    }
+    TRY_ASSIGN(Page got, (store.*query)(key, {}, page));
+    std::ranges::move(got.*items, std::back_inserter(all));
     page.cursor = std::move(got.next_cursor);
   } while (!page.cursor.empty());
-  std::ranges::stable_sort(samples, {}, &signals::Sample::utime_us);
-  const auto same = std::ranges::unique(samples, {}, &signals::Sample::utime_us);
-  samples.erase(same.begin(), same.end());
-  return samples;
-}
-
-Result<std::vector<signals::CovariateSeries>> covariates_of(const history::Store& store,
-                                                            history::MissionKey key) {
-  std::vector<signals::CovariateChange> changes;
-  history::PageRequest page;
-  page.limit = history::max_telemetry_samples;
-  do {
-    TRY_ASSIGN(history::CovariatePage got, store.covariates(key, {}, page));
-    changes.insert(changes.end(), std::make_move_iterator(got.changes.begin()),
-                   std::make_move_iterator(got.changes.end()));
-    page.cursor = std::move(got.next_cursor);
-  } while (!page.cursor.empty());
-  return signals::series_of(changes);
+  return all;
 }
 
 class Reader {
@@ -58,7 +42,9 @@ class Reader {
     if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
                       wanted_.max_samples)
       return ++out.too_many, Result<void>{};
-    TRY_ASSIGN(std::vector<signals::Sample> samples, samples_of(store_, mission.key));
+    TRY_ASSIGN(auto samples,
+               all_of(store_, mission.key, &history::Store::telemetry, &history::TelemetryPage::samples));
+    telemetry::put_in_order(samples);
     // The accounts of a mission do not apply once the retention has dropped a part of it.
     if (static_cast<std::int64_t>(samples.size()) * 10 < mission.samples * 9 || samples.size() < 2)
       return ++out.no_telemetry, Result<void>{};
@@ -66,12 +52,13 @@ class Reader {
         charging != mission.sample_faults.end() && charging->second > 0)
       out.charging_samples += ingest::drop_charging(wanted_.battery_capacity_ah, samples);
     if (samples.size() < 2) return ++out.no_telemetry, Result<void>{};
-    TRY_ASSIGN(std::vector<signals::CovariateSeries> covariates, covariates_of(store_, mission.key));
+    TRY_ASSIGN(const auto changes,
+               all_of(store_, mission.key, &history::Store::covariates, &history::CovariatePage::changes));
     result_.samples += samples.size();
     result_.missions.push_back({mission.key,
                                 mission.start_utime_us,
                                 {mission.robot_id, mission.mission_id, mission.payload_kg, std::move(samples),
-                                 std::move(covariates)}});
+                                 signals::series_of(changes)}});
     return {};
   }
 

@@ -52,10 +52,6 @@ ProposalReview::ProposalReview(const history::Store& store, history::Writer& wri
       now_utime_us_(std::move(now_utime_us)),
       options_(std::move(options)) {}
 
-ProposalReview::~ProposalReview() {
-  stop();
-}
-
 void ProposalReview::suggest(history::Proposal candidate) {
   {
     const std::lock_guard lock(mutex_);
@@ -170,25 +166,15 @@ Result<void> ProposalReview::dismiss(const history::Proposal& proposal, const st
 }
 
 void ProposalReview::start() {
-  running_ = true;
-  thread_ = std::thread([this] {
+  thread_ = std::jthread([this](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    while (running_) {
-      wake_.wait(lock, [this] { return !running_ || !suggested_.empty() || !ended_.empty(); });
+    while (!stop.stop_requested()) {
+      wake_.wait(lock, stop, [this] { return !suggested_.empty() || !ended_.empty(); });
       lock.unlock();
       survive("proposal review", [this] { look(); });
       lock.lock();
     }
   });
-}
-
-void ProposalReview::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    running_ = false;
-  }
-  wake_.notify_all();
-  if (thread_.joinable()) thread_.join();
 }
 
 }  // namespace joulecast::server

@@ -29,7 +29,6 @@ class ProposalReview {
  public:
   ProposalReview(const history::Store& store, history::Writer& writer, ModelAdoption& adoption,
                  const DriftView& drift, std::function<std::int64_t()> now_utime_us, ReviewOptions options);
-  ~ProposalReview();
 
   // To be called by sessions; do not wait.
   void suggest(history::Proposal candidate);
@@ -40,7 +39,7 @@ class ProposalReview {
 
   // Looks when something has come, in a thread of its own, until stop().
   void start();
-  void stop();
+  void stop() { thread_ = {}; }
 
  private:
   Result<bool> review(history::Proposal candidate);
@@ -59,11 +58,10 @@ class ProposalReview {
   std::function<std::int64_t()> now_utime_us_;
   ReviewOptions options_;
   std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable_any wake_;
   std::map<std::string, history::Proposal> suggested_;  // by robot: the newest counts
   std::set<std::string> ended_;
-  bool running_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace joulecast::server

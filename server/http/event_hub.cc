@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <deque>
 #include <map>
-#include <mutex>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "access/sha256.h"
 #include "base/try.h"
@@ -27,39 +24,15 @@ void append_line(std::string& out, std::string_view field, std::string_view valu
 
 }  // namespace
 
-struct EventHub::State {
-  struct Event {
-    std::uint64_t number;
-    std::string topic;
-    std::string replaces;  // events of one name here outdate each other; empty: none does
-    std::string text;      // as sent
-  };
-
-  struct Subscriber;
-
-  explicit State(const Options& given) : options(given), epoch(access::random_hex(4)) {}
-
-  const Options options;
-  const std::string epoch;
-  mutable std::mutex mutex;
-  std::uint64_t next_number = 1;
-  std::deque<std::shared_ptr<const Event>> backlog;
-  std::size_t backlog_bytes = 0;
-  std::vector<std::weak_ptr<Subscriber>> subscribers;
-  std::uint64_t dropped = 0;
-  bool ended = false;
-
-  // For another stream of that client, see subscribe().
-  bool make_room(const std::string& client);
-
-  std::size_t count_living() {
-    std::erase_if(subscribers, [](const auto& each) { return each.expired(); });
-    return subscribers.size();
-  }
+struct EventHub::Event {
+  std::uint64_t number;
+  std::string topic;
+  std::string replaces;  // events of one name here outdate each other; empty: none does
+  std::string text;      // as sent
 };
 
 // The queue is filled by publishers and emptied by the server's I/O thread.
-struct EventHub::State::Subscriber : public StreamSource {
+struct EventHub::Subscriber : public StreamSource {
   Subscriber(const Options& options, std::string topic_in, std::string client_in)
       : topic(std::move(topic_in)),
         client(std::move(client_in)),
@@ -156,16 +129,10 @@ struct EventHub::State::Subscriber : public StreamSource {
 };
 
 EventHub::EventHub() : EventHub(Options{}) {}
-EventHub::EventHub(const Options& options) : state_(std::make_shared<State>(options)) {}
+EventHub::EventHub(const Options& options) : options_(options), epoch_(access::random_hex(4)) {}
 
 EventHub::~EventHub() {
-  std::vector<std::weak_ptr<State::Subscriber>> subscribers;
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->ended = true;
-    subscribers.swap(state_->subscribers);
-  }
-  for (const auto& each : subscribers)
+  for (const auto& each : subscribers_)
     if (const auto subscriber = each.lock()) subscriber->finish();
 }
 
@@ -179,47 +146,47 @@ void EventHub::publish_newest(std::string_view event, std::string_view data, std
 
 void EventHub::send(std::string_view event, std::string_view data, std::string_view topic,
                     std::string replaces) {
-  const std::lock_guard lock(state_->mutex);
-  auto entry = std::make_shared<State::Event>();
-  entry->number = state_->next_number++;
+  const std::lock_guard lock(mutex_);
+  auto entry = std::make_shared<Event>();
+  entry->number = next_number_++;
   entry->topic = topic;
   entry->replaces = std::move(replaces);
   append_line(entry->text, "event", event);
-  append_line(entry->text, "id", state_->epoch + "-" + std::to_string(entry->number));
+  append_line(entry->text, "id", epoch_ + "-" + std::to_string(entry->number));
   append_line(entry->text, "data", data);
   entry->text.push_back('\n');
-  const std::shared_ptr<const State::Event> shared = std::move(entry);
+  const std::shared_ptr<const Event> shared = std::move(entry);
 
-  state_->backlog.push_back(shared);
-  state_->backlog_bytes += shared->text.size();
-  while (state_->backlog_bytes > state_->options.backlog_bytes && !state_->backlog.empty()) {
-    state_->backlog_bytes -= state_->backlog.front()->text.size();
-    state_->backlog.pop_front();
+  backlog_.push_back(shared);
+  backlog_bytes_ += shared->text.size();
+  while (backlog_bytes_ > options_.backlog_bytes && !backlog_.empty()) {
+    backlog_bytes_ -= backlog_.front()->text.size();
+    backlog_.pop_front();
   }
   // Under the lock, so that every subscriber sees the events in the order of their numbers.
-  std::erase_if(state_->subscribers, [&](const auto& each) {
+  std::erase_if(subscribers_, [&](const auto& each) {
     const auto subscriber = each.lock();
     if (!subscriber) return true;
     if (subscriber->offer(shared)) return false;
-    ++state_->dropped;
+    ++dropped_;
     return true;
   });
 }
 
 // With the mutex held.
-bool EventHub::State::make_room(const std::string& client) {
+bool EventHub::make_room(const std::string& client) {
   std::map<std::string, std::size_t> held;
-  for (const auto& each : subscribers)
+  for (const auto& each : subscribers_)
     if (const auto subscriber = each.lock()) ++held[subscriber->client];
   const std::size_t own = held[client];
-  if (!client.empty() && own >= std::max<std::size_t>(options.max_subscribers / 4, 1)) return false;
-  if (count_living() < options.max_subscribers) return true;
+  if (!client.empty() && own >= std::max<std::size_t>(options_.max_subscribers / 4, 1)) return false;
+  if (count_living() < options_.max_subscribers) return true;
   const auto most = std::ranges::max_element(held, {}, [](const auto& each) { return each.second; });
   if (most->second <= own) return false;
-  for (auto each = subscribers.begin(); each != subscribers.end(); ++each) {
+  for (auto each = subscribers_.begin(); each != subscribers_.end(); ++each) {
     const auto oldest = each->lock();
     if (!oldest || oldest->client != most->first) continue;
-    subscribers.erase(each);
+    subscribers_.erase(each);
     oldest->finish();
     return true;
   }
@@ -228,31 +195,29 @@ bool EventHub::State::make_room(const std::string& client) {
 
 Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_event_id,
                                                           std::string_view topic, std::string_view client) {
-  const std::lock_guard lock(state_->mutex);
-  if (!state_->make_room(std::string(client)))
+  const std::lock_guard lock(mutex_);
+  if (!make_room(std::string(client)))
     return fail(Fault::unavailable, "",
-                "the limit of " + std::to_string(state_->options.max_subscribers) +
+                "the limit of " + std::to_string(options_.max_subscribers) +
                     " event streams, or of a quarter of them for one client, is reached");
-  auto subscriber =
-      std::make_shared<State::Subscriber>(state_->options, std::string(topic), std::string(client));
+  auto subscriber = std::make_shared<Subscriber>(options_, std::string(topic), std::string(client));
   if (!last_event_id.empty()) {
     const auto dash = last_event_id.rfind('-');
     std::optional<std::uint64_t> number;
-    if (dash != std::string_view::npos && last_event_id.substr(0, dash) == state_->epoch)
+    if (dash != std::string_view::npos && last_event_id.substr(0, dash) == epoch_)
       number = parse_number<std::uint64_t>(last_event_id.substr(dash + 1));
-    const std::uint64_t oldest =
-        state_->backlog.empty() ? state_->next_number : state_->backlog.front()->number;
-    if (number && *number + 1 >= oldest && *number < state_->next_number) {
-      for (const auto& event : state_->backlog)
+    const std::uint64_t oldest = backlog_.empty() ? next_number_ : backlog_.front()->number;
+    if (number && *number + 1 >= oldest && *number < next_number_) {
+      for (const auto& event : backlog_)
         if (event->number > *number) subscriber->offer(event);
     } else {
       append_line(subscriber->notice, "event", "reset");
-      append_line(subscriber->notice, "id", state_->epoch + "-" + std::to_string(state_->next_number - 1));
+      append_line(subscriber->notice, "id", epoch_ + "-" + std::to_string(next_number_ - 1));
       append_line(subscriber->notice, "data", "{}");
       subscriber->notice.push_back('\n');
     }
   }
-  state_->subscribers.push_back(subscriber);
+  subscribers_.push_back(subscriber);
   return std::shared_ptr<StreamSource>(std::move(subscriber));
 }
 
@@ -266,9 +231,14 @@ Result<Response> EventHub::respond(const Request& request, std::string_view topi
   return response;
 }
 
+std::size_t EventHub::count_living() const {
+  std::erase_if(subscribers_, [](const auto& each) { return each.expired(); });
+  return subscribers_.size();
+}
+
 EventHub::Counts EventHub::counts() const {
-  const std::lock_guard lock(state_->mutex);
-  return {state_->next_number - 1, state_->dropped, state_->count_living()};
+  const std::lock_guard lock(mutex_);
+  return {next_number_ - 1, dropped_, count_living()};
 }
 
 }  // namespace joulecast::http

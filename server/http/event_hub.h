@@ -3,9 +3,12 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/http/message.h"
 
@@ -56,9 +59,22 @@ class EventHub {
   Counts counts() const;
 
  private:
-  struct State;
+  struct Event;
+  struct Subscriber;
+
   void send(std::string_view event, std::string_view data, std::string_view topic, std::string replaces);
-  std::shared_ptr<State> state_;
+  // For another stream of that client, see subscribe().
+  bool make_room(const std::string& client);
+  std::size_t count_living() const;
+
+  const Options options_;
+  const std::string epoch_;
+  mutable std::mutex mutex_;
+  std::uint64_t next_number_ = 1;
+  std::deque<std::shared_ptr<const Event>> backlog_;
+  std::size_t backlog_bytes_ = 0;
+  mutable std::vector<std::weak_ptr<Subscriber>> subscribers_;
+  std::uint64_t dropped_ = 0;
 };
 
 }  // namespace joulecast::http

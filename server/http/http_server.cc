@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstdio>
-#include <ctime>
 #include <exception>
 #include <future>
 #include <iterator>
@@ -13,7 +11,9 @@
 #include <vector>
 
 #include "access/sha256.h"
+#include "base/host_clock.h"
 #include "base/try.h"
+#include "base/utc_time.h"
 #include "server/http/tls.h"
 
 namespace joulecast::http {
@@ -26,16 +26,7 @@ constexpr std::size_t guest_places = 64;
 constexpr std::size_t operations_queue = 64;
 
 std::string http_date() {
-  const std::time_t now = std::time(nullptr);
-  std::tm parts{};
-  gmtime_r(&now, &parts);
-  static constexpr const char* days[] = {"Sun", "Mon", "Tue", "Wed", "Thu", "Fri", "Sat"};
-  static constexpr const char* months[] = {"Jan", "Feb", "Mar", "Apr", "May", "Jun",
-                                           "Jul", "Aug", "Sep", "Oct", "Nov", "Dec"};
-  char text[64];
-  std::snprintf(text, sizeof text, "%s, %02d %s %04d %02d:%02d:%02d GMT", days[parts.tm_wday], parts.tm_mday,
-                months[parts.tm_mon], parts.tm_year + 1900, parts.tm_hour, parts.tm_min, parts.tm_sec);
-  return text;
+  return format_utc(host_utime_us(), "%a, %d %b %Y %H:%M:%S GMT");
 }
 
 std::int64_t milliseconds_now() {

@@ -1,5 +1,6 @@
 #include "server/http/problem.h"
 
+#include <boost/beast/http/status.hpp>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -63,20 +64,11 @@ unsigned status_of(Fault fault) {
 }
 
 std::string_view reason_phrase(unsigned status) {
-  // clang-format off
-  static const std::map<unsigned, std::string_view> phrases{
-      {100, "Continue"}, {200, "OK"}, {201, "Created"}, {202, "Accepted"}, {204, "No Content"},
-      {206, "Partial Content"}, {301, "Moved Permanently"}, {303, "See Other"}, {304, "Not Modified"},
-      {308, "Permanent Redirect"}, {400, "Bad Request"}, {401, "Unauthorized"}, {403, "Forbidden"},
-      {404, "Not Found"}, {405, "Method Not Allowed"}, {406, "Not Acceptable"}, {408, "Request Timeout"},
-      {409, "Conflict"}, {412, "Precondition Failed"}, {413, "Content Too Large"}, {414, "URI Too Long"},
-      {415, "Unsupported Media Type"}, {417, "Expectation Failed"}, {421, "Misdirected Request"},
-      {422, "Unprocessable Content"}, {429, "Too Many Requests"}, {431, "Request Header Fields Too Large"},
-      {499, "Client Closed Request"}, {500, "Internal Server Error"}, {501, "Not Implemented"},
-      {503, "Service Unavailable"}, {505, "HTTP Version Not Supported"}};
-  // clang-format on
-  const auto known = phrases.find(status);
-  return known != phrases.end() ? known->second : "Status";
+  // Renamed by RFC 9110.
+  if (status == 413) return "Content Too Large";
+  if (status == 422) return "Unprocessable Content";
+  const auto phrase = boost::beast::http::obsolete_reason(boost::beast::http::int_to_status(status));
+  return {phrase.data(), phrase.size()};
 }
 
 Response problem(unsigned status, std::string_view slug, std::string_view detail, std::string_view request_id,

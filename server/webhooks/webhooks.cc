@@ -83,9 +83,8 @@ class Webhooks::Sender {
   };
 
   Sender(Webhook webhook, const Options& options) : webhook_(std::move(webhook)), options_(options) {
-    thread_ = std::thread([this] { run(); });
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
-  ~Sender() { stop(); }
   Sender(const Sender&) = delete;
   Sender& operator=(const Sender&) = delete;
 
@@ -103,17 +102,8 @@ class Webhooks::Sender {
     wake_.notify_one();
   }
 
-  void tell_to_stop() {
-    {
-      const std::lock_guard lock(mutex_);
-      stopping_ = true;
-    }
-    wake_.notify_one();
-  }
-  void stop() {
-    tell_to_stop();
-    if (thread_.joinable()) thread_.join();
-  }
+  void tell_to_stop() { thread_.request_stop(); }
+  void stop() { thread_ = {}; }
 
   Status status() const {
     const std::lock_guard lock(mutex_);
@@ -123,23 +113,23 @@ class Webhooks::Sender {
   }
 
  private:
-  void run() {
+  void run(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     for (;;) {
-      wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
-      if (stopping_) return;
+      wake_.wait(lock, stop, [this] { return !queue_.empty(); });
+      if (stop.stop_requested()) return;
       const Delivery next = std::move(queue_.front());
       queue_.pop_front();
       sending_ = true;
-      deliver(next, lock);
+      deliver(next, lock, stop);
       sending_ = false;
     }
   }
 
   // Tries until it is answered, given up or the service stops. Called and returns with the lock.
-  void deliver(const Delivery& delivery, std::unique_lock<std::mutex>& lock) {
+  void deliver(const Delivery& delivery, std::unique_lock<std::mutex>& lock, const std::stop_token& stop) {
     std::chrono::milliseconds pause = options_.first_pause;
-    for (int attempt = 1; !stopping_; ++attempt) {
+    for (int attempt = 1; !stop.stop_requested(); ++attempt) {
       lock.unlock();
       Result<void> sent = fail(Fault::internal, webhook_.host, "the attempt broke off");
       survive("webhooks", [&] { sent = post(delivery); });
@@ -155,7 +145,7 @@ class Webhooks::Sender {
         ++counts_.given_up;
         return;
       }
-      wake_.wait_for(lock, pause, [this] { return stopping_; });
+      wake_.wait_for(lock, stop, pause, [] { return false; });
       pause = std::min(2 * pause, options_.last_pause);
     }
   }
@@ -180,11 +170,11 @@ class Webhooks::Sender {
   const Webhook webhook_;
   const Options& options_;
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable_any wake_;
   std::deque<Delivery> queue_;
   Counts counts_;
-  bool sending_ = false, failing_ = false, stopping_ = false;
-  std::thread thread_;
+  bool sending_ = false, failing_ = false;
+  std::jthread thread_;
 };
 
 Webhooks::Webhooks(std::vector<Webhook> webhooks, Options options)

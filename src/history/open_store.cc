@@ -17,20 +17,6 @@ namespace {
 
 constexpr std::string_view sqlite_scheme = "sqlite:";
 
-PostgresOptions postgres_options(const std::string& url, const StoreOptions& given = {}) {
-  PostgresOptions options;
-  options.url = url;
-  options.query_limit = given.query_limit;
-  options.standby = given.standby;
-  return options;
-}
-
-SqliteOptions sqlite_options(const std::string& url) {
-  SqliteOptions options;
-  options.path = sqlite_path(url);
-  return options;
-}
-
 constexpr std::int64_t offline_busy_timeout_ms = 10'000;
 
 Result<std::unique_ptr<SqliteDatabase>> connect_file(const std::string& path, OpenMode mode) {
@@ -92,33 +78,22 @@ std::string sqlite_path(const std::string& url) {
 
 Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options) {
   TRY(check_store_url(url));
-  if (is_postgres_url(url)) return open_postgres_store(postgres_options(url, options));
+  if (is_postgres_url(url)) return open_postgres_store(url, options);
+  if (!options.shared_writer.empty()) return invalid("url", "must be postgresql://...");
   if (!options.standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
-  SqliteOptions file = sqlite_options(url);
-  file.durability = options.durability;
-  return open_sqlite_store(file);
-}
-
-Result<std::unique_ptr<Store>> open_shared_store(
-    const std::string& url, const std::string& writer,
-    std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped, const StoreOptions& given) {
-  if (!is_postgres_url(url)) return invalid("url", "must be postgresql://...");
-  PostgresOptions options = postgres_options(url, given);
-  options.shared_writer = writer;
-  options.on_dropped = std::move(on_dropped);
-  return open_postgres_store(options);
+  return open_sqlite_store(sqlite_path(url), options);
 }
 
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist) {
   TRY(check_store_url(url));
   if (is_postgres_url(url)) {
     if (must_exist) TRY(connect_server(url));
-    return open_postgres_tables(postgres_options(url));
+    return open_postgres_tables(url, {});
   }
   if (must_exist)
     if (const auto there = connect_file(sqlite_path(url), OpenMode::read_only); !there)
       return fail(there.error().fault, "url", describe(there.error()));
-  return open_sqlite_tables(sqlite_options(url));
+  return open_sqlite_tables(sqlite_path(url), {});
 }
 
 Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenMode mode, bool or_older) {

@@ -21,22 +21,6 @@ enum class Durability {
   process_end  // synchronous=NORMAL: a power cut loses the last commits, and damages nothing
 };
 
-struct SqliteOptions {
-  std::string path;                     // of the database file; created when absent, its folder is not
-  std::size_t readers = 4;              // connections for queries; further queries wait for one
-  std::int64_t busy_timeout_ms = 2000;  // how long a lock of another process is waited for
-  Durability durability = Durability::power_cut;
-  std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
-};
-
-// Opens the store, creating or migrating its schema. Fault::conflict: the file's schema is newer than this
-// program. Fault::corrupt: the file is no database, or damaged. Fault::unavailable: it cannot be opened or
-// written.
-Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options);
-
-// The same as tables, locked against every other program until released.
-Result<std::shared_ptr<Database>> open_sqlite_tables(const SqliteOptions& options);
-
 // A standby of a store's server, for Store::past().
 struct StandbyOptions {
   std::string url;             // as the store's; empty: none
@@ -44,28 +28,21 @@ struct StandbyOptions {
   std::size_t readers = 4;     // connections; further queries wait for one
 };
 
-struct PostgresOptions {
-  std::string url;                             // libpq's: postgresql://user@host1,host2/database?option=value
-  std::size_t readers = 4;                     // connections for queries; further queries wait for one
-  std::chrono::milliseconds lock_wait{3000};   // for another program's hold on the store to end
-  std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
+struct StoreOptions {
+  std::size_t readers = 4;                          // connections for queries; further queries wait for one
+  std::int64_t busy_timeout_ms = 2000;              // how long a commit waits for a lock of another program
+  std::function<std::int64_t()> now_utime_us = {};  // the clock that retention goes by; empty: the system's
+  Durability durability = Durability::power_cut;    // of SQLite's file; a PostgreSQL has its own settings
+  // Of a PostgreSQL alone, as those below.
+  std::chrono::milliseconds lock_wait{3000};  // for another program's hold on the store to end
+  std::chrono::milliseconds query_limit{0};   // each statement of a query; 0: unlimited
+  StandbyOptions standby = {};
   // If set: this program's name among those that write to the store at the same time, from new_writer_name().
   // All of them set it.
-  std::string shared_writer;
+  std::string shared_writer = {};
   // How many commands were dropped for carrying this epoch of a robot's lease; called on apply()'s thread.
-  std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped;
-  std::chrono::milliseconds query_limit{0};  // each statement of a query; 0: unlimited
-  StandbyOptions standby;
+  std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped = {};
 };
-
-// Opens the store, creating or migrating its tables in the first schema of the connection's search_path. One
-// program at a time holds it, by an advisory lock of its writing connection, or several with shared_writer.
-// Fault::conflict: another program holds it, or its schema is newer than this program. Fault::unavailable: no
-// server that accepts writes is reached.
-Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options);
-
-// The same as tables, locked against every other program until released.
-Result<std::shared_ptr<Database>> open_postgres_tables(const PostgresOptions& options);
 
 // Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
 bool is_postgres_url(std::string_view url);
@@ -73,26 +50,21 @@ bool is_postgres_url(std::string_view url);
 // Checks that it is a URL or path of a store, without connecting to it. Fault::invalid on "url".
 Result<void> check_store_url(const std::string& url);
 
-struct StoreOptions {
-  std::chrono::milliseconds query_limit{0};       // each statement of a query to a PostgreSQL; 0: unlimited
-  StandbyOptions standby;                         // of a PostgreSQL
-  Durability durability = Durability::power_cut;  // of SQLite's file; a PostgreSQL has its own settings
-};
-
-// Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
-// open_postgres_store()'s; Fault::invalid on "url" for any other scheme. The standby is not queried yet.
+// Opens the store of a URL, creating or migrating its schema: sqlite:PATH, a PATH, or postgresql://..., whose
+// tables are in the first schema of the search_path. One program at a time holds a store, or several a
+// PostgreSQL with shared_writer. The standby is not queried yet. Fault::conflict: another program holds it,
+// or its schema is newer than this program. Fault::corrupt: the file is no database, or damaged.
+// Fault::unavailable: it cannot be opened or written. Fault::invalid: the URL, or an option that it excludes.
 Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options = {});
-
-// The store of a PostgreSQL URL, which other programs that name themselves write to as well: see
-// PostgresOptions for `writer` and `on_dropped`.
-Result<std::unique_ptr<Store>> open_shared_store(
-    const std::string& url, const std::string& writer,
-    std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped,
-    const StoreOptions& options = {});
+// The parts of that.
+Result<std::unique_ptr<Store>> open_sqlite_store(const std::string& path, const StoreOptions& options = {});
+Result<std::unique_ptr<Store>> open_postgres_store(const std::string& url, const StoreOptions& options);
 
 // The same as tables, locked against every other program until released. With `must_exist` nothing is
 // created: the errors are then also open_to_read()'s.
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist);
+Result<std::shared_ptr<Database>> open_sqlite_tables(const std::string& path, const StoreOptions& options);
+Result<std::shared_ptr<Database>> open_postgres_tables(const std::string& url, const StoreOptions& options);
 
 // A read-only connection to the tables of a URL, also while another program holds them; migrates nothing.
 // Fault::not_found if there is no such file, ::corrupt if it is no store, ::conflict if its schema is of

@@ -47,21 +47,17 @@ Result<void> wait_for_lock(Database& database, bool (*try_it)(Database&),
   return {};
 }
 
-std::function<std::int64_t()> clock_of(const PostgresOptions& options) {
-  return options.now_utime_us ? options.now_utime_us : host_utime_us;
-}
-
-Result<std::unique_ptr<PostgresDatabase>> connect_writer(const PostgresOptions& options,
+Result<std::unique_ptr<PostgresDatabase>> connect_writer(const std::string& url,
                                                          const std::string& writer_name) {
-  auto database = std::make_unique<PostgresDatabase>(options.url, writer_name);
+  auto database = std::make_unique<PostgresDatabase>(url, writer_name);
   if (database->integer("SELECT (current_schema() IS NOT NULL)::int") == 0)
     return fail(Fault::not_found, "database", "the search_path names no schema that exists");
   return database;
 }
 
-Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& options,
+Result<std::unique_ptr<PostgresDatabase>> open_writer(const std::string& url, const StoreOptions& options,
                                                       const std::string& writer_name) {
-  TRY_ASSIGN(auto database, connect_writer(options, writer_name));
+  TRY_ASSIGN(auto database, connect_writer(url, writer_name));
   TRY(wait_for_lock(*database, try_lock, options.lock_wait));
   TRY(bring_to_postgres_schema(*database));
   return database;
@@ -90,8 +86,9 @@ void prepare_shared(Database& database) {
       "(SELECT last_value FROM cluster_mission_keys)) + 1)");
 }
 
-Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptions& options) {
-  auto opened = connect_writer(options, options.shared_writer);
+Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const std::string& url,
+                                                             const StoreOptions& options) {
+  auto opened = connect_writer(url, options.shared_writer);
   if (!opened) return opened;
   PostgresDatabase& database = **opened;
   if (try_lock(database)) {
@@ -120,17 +117,19 @@ constexpr std::string_view next_keys = "SELECT nextval('cluster_mission_keys')";
 
 class PostgresStore final : public SqlStore {
  public:
-  PostgresStore(const PostgresOptions& options, std::string name, std::unique_ptr<PostgresDatabase> writer)
+  PostgresStore(const std::string& url, const StoreOptions& options, std::string name,
+                std::unique_ptr<PostgresDatabase> writer)
       : SqlStore(
-            [url = options.url, name, limit = options.query_limit] {
+            [url, name, limit = options.query_limit] {
               auto reader = std::make_unique<PostgresDatabase>(url, name + "-reader");
               reader->limit_statements(limit);
               return reader;
             },
             options.readers, greatest_key(*writer)),
-        url_(options.url),
+        url_(url),
         name_(std::move(name)),
-        now_utime_us_(clock_of(options)),
+        now_utime_us_(options.now_utime_us ? options.now_utime_us : host_utime_us),
+        lock_timeout_ms_(options.busy_timeout_ms),
         shared_(!options.shared_writer.empty()),
         on_dropped_(options.on_dropped) {
     BatchMark last = SqlChanges::mark_of(*writer);
@@ -224,9 +223,8 @@ class PostgresStore final : public SqlStore {
     return command_bytes(each);
   }
 
-  // A commit waits for locks of other programs as long as an SQLite store does.
   void use(std::unique_ptr<PostgresDatabase> writer) {
-    writer->execute("SET lock_timeout = " + std::to_string(SqliteOptions{}.busy_timeout_ms));
+    writer->execute("SET lock_timeout = " + std::to_string(lock_timeout_ms_));
     changes_.reset();
     writer_ = std::move(writer);
     changes_.emplace(*writer_, now_utime_us_, shared_ ? name_ : std::string());
@@ -316,6 +314,7 @@ class PostgresStore final : public SqlStore {
 
   const std::string url_, name_;
   const std::function<std::int64_t()> now_utime_us_;
+  const std::int64_t lock_timeout_ms_;
   const bool shared_;
   const std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped_;
   struct KeyBlock {
@@ -334,22 +333,22 @@ class PostgresStore final : public SqlStore {
 
 }  // namespace
 
-Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options) {
+Result<std::unique_ptr<Store>> open_postgres_store(const std::string& url, const StoreOptions& options) {
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
     if (!options.shared_writer.empty()) {
-      TRY_ASSIGN(auto writer, open_shared_writer(options));
-      return std::make_unique<PostgresStore>(options, options.shared_writer, std::move(writer));
+      TRY_ASSIGN(auto writer, open_shared_writer(url, options));
+      return std::make_unique<PostgresStore>(url, options, options.shared_writer, std::move(writer));
     }
     const std::string name = new_writer_name();
-    TRY_ASSIGN(auto writer, open_writer(options, name));
+    TRY_ASSIGN(auto writer, open_writer(url, options, name));
     advance_identities(*writer);
-    return std::make_unique<PostgresStore>(options, name, std::move(writer));
+    return std::make_unique<PostgresStore>(url, options, name, std::move(writer));
   });
 }
 
-Result<std::shared_ptr<Database>> open_postgres_tables(const PostgresOptions& options) {
+Result<std::shared_ptr<Database>> open_postgres_tables(const std::string& url, const StoreOptions& options) {
   return guarded([&]() -> Result<std::shared_ptr<Database>> {
-    TRY_ASSIGN(auto writer, open_writer(options, new_writer_name()));
+    TRY_ASSIGN(auto writer, open_writer(url, options, new_writer_name()));
     return std::shared_ptr<Database>(std::move(writer));
   });
 }

@@ -69,12 +69,24 @@ void restore_objects(Database& database, const Schema& schema) {
   append_audit(database, {0, host_utime_us(), "", "", "", "schema_restored", detail.take(), ""});
 }
 
+// The schema of a database whose version before these changes is `version`.
+Schema with_changes(
+    std::int64_t version, std::string_view sql,
+    std::string (*in_dialect)(std::string) = [](std::string change) { return change; }) {
+  // Changes of schemas/store.sql since the first release, in its dialect. Each makes the next version.
+  const std::vector<std::string> changes{};
+  Schema schema{version, sql, {}};
+  for (const std::string& change : changes)
+    schema.migrations.push_back({schema.version++, in_dialect(change)});
+  return schema;
+}
+
 }  // namespace
 
 extern const std::string_view store_sql;  // schemas/store.sql, embedded at build
 
 const Schema& store_schema() {
-  static const Schema schema{10, store_sql, {}};
+  static const Schema schema = with_changes(10, store_sql);
   return schema;
 }
 
@@ -126,7 +138,7 @@ Result<void> migrate(Database& database, const Schema& schema, std::int64_t vers
   if (version == schema.version) return {};
   TRY(check_older(schema, version));
   for (const Migration& migration : schema.migrations)
-    if (migration.from >= version) database.execute(std::string(migration.sql));
+    if (migration.from >= version) database.execute(migration.sql);
   return {};
 }
 
@@ -181,7 +193,7 @@ const Schema& postgres_schema() {
                                      .append(postgres_store_sql)
                                      .append(mission_day_sql())
                                      .append(postgres_cluster_sql);
-  static const Schema schema{7, sql, {}};
+  static const Schema schema = with_changes(7, sql, in_postgres);
   return schema;
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,15 +13,14 @@ namespace joulecast::history {
 // One step from schema version `from` to from + 1.
 struct Migration {
   std::int64_t from = 0;
-  std::string_view sql;
+  std::string sql;
 };
 
 // A schema as it is now, and the way to it from older files.
 struct Schema {
   std::int64_t version = 0;
-  std::string_view sql;  // makes an empty database one of `version`
-  std::span<const Migration>
-      migrations;  // ascending in `from`, without a hole up to version - 1; may be empty
+  std::string_view sql;               // makes an empty database one of `version`
+  std::vector<Migration> migrations;  // ascending in `from`, without a hole up to version - 1; may be empty
 };
 
 // The schema of schemas/store.sql.

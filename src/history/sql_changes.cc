@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <ranges>
 #include <set>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 
 #include "base/try.h"
 #include "history/audit.h"
+#include "history/schema.h"
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
 #include "history/sql_rows.h"
@@ -658,16 +660,20 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
         "?)");
     change("DELETE FROM mission_day WHERE robot_id = ?");
   }
-  for (const char* sql :
-       {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",
-        "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
-    change(sql);
-  Rows deleted(database_,
-               "DELETE FROM mission WHERE robot_id = ? RETURNING robot_id, start_utime_us, mission_key");
-  const std::int64_t missions = drop_missions(deleted.bind(c.robot_id));
+  std::int64_t missions = 0;
+  for (const Table& table : store_tables() | std::views::reverse) {
+    const bool has_robot =
+        std::ranges::any_of(table.columns, [](const auto& column) { return column.first == "robot_id"; });
+    if (table.name == "event" || !has_robot) continue;
+    const std::string sql = "DELETE FROM " + table.name + " WHERE robot_id = ?";
+    if (table.name == "mission") {
+      Rows deleted(database_, sql + " RETURNING robot_id, start_utime_us, mission_key");
+      missions = drop_missions(deleted.bind(c.robot_id));
+    } else {
+      change(sql);
+    }
+  }
   days_.forget(c.robot_id);
-  change("DELETE FROM model WHERE robot_id = ?");
-  change("DELETE FROM robot WHERE robot_id = ?");
   known_robots_.erase(c.robot_id);
   return missions;
 }

@@ -113,14 +113,13 @@ Outcome SqlChanges::run(const CloseProposal& c) {
 }
 
 Result<DiagnosisRecord> Store::diagnosis(std::int64_t id) const {
-  return read([&](Database& database) -> Result<DiagnosisRecord> {
-    return by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis);
-  });
+  return read(
+      [&](Database& database) { return by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis); });
 }
 
 Result<std::vector<DiagnosisRecord>> Store::diagnoses(const std::optional<std::string>& robot_id,
                                                       std::int64_t before_id, std::int64_t limit) const {
-  return read([&](Database& database) -> Result<std::vector<DiagnosisRecord>> {
+  return read([&](Database& database) {
     return page<DiagnosisRecord>(database, "diagnosis", robot_id, before_id, limit,
                                  {"result_json", "model_json"});
   });
@@ -145,7 +144,7 @@ Result<Proposal> Store::proposal(std::int64_t id) const {
 
 Result<std::vector<Proposal>> Store::proposals(const std::optional<std::string>& robot_id,
                                                std::int64_t before_id, std::int64_t limit) const {
-  return read([&](Database& database) -> Result<std::vector<Proposal>> {
+  return read([&](Database& database) {
     return page<Proposal>(database, "proposal", robot_id, before_id, limit, {});
   });
 }

@@ -273,7 +273,7 @@ Result<std::vector<TotalsGroup>> History::grouped_totals(const MissionFilter& fi
 }
 
 Result<std::vector<Mission>> Store::recover() const {
-  return read([&](Database& database) -> Result<std::vector<Mission>> {
+  return read([&](Database& database) {
     return select_all<Mission>(database,
                                "FROM mission WHERE state = 'open' ORDER BY start_utime_us, mission_key");
   });

@@ -58,9 +58,8 @@ static Result<void> check_page(Database& database, MissionKey key, TimeRange ran
 }
 
 Result<std::vector<RobotRecord>> Store::robots() const {
-  return read([&](Database& database) -> Result<std::vector<RobotRecord>> {
-    return select_all<RobotRecord>(database, "FROM robot ORDER BY robot_id");
-  });
+  return read(
+      [](Database& database) { return select_all<RobotRecord>(database, "FROM robot ORDER BY robot_id"); });
 }
 
 Result<ModelVersion> Store::model(std::string_view robot_id, std::optional<std::int64_t> version) const {
@@ -172,26 +171,26 @@ static Result<std::vector<Record>> read_log(Database& database, const std::strin
 
 Result<std::vector<Event>> Store::events(std::int64_t behind_id, std::int64_t limit,
                                          const LogFilter& filter) const {
-  return read([&](Database& database) -> Result<std::vector<Event>> {
+  return read([&](Database& database) {
     return read_log<Event>(database, "event", "kind", behind_id, limit, filter);
   });
 }
 
 Result<std::vector<AuditEntry>> Store::audit(std::int64_t behind_id, std::int64_t limit,
                                              const LogFilter& filter) const {
-  return read([&](Database& database) -> Result<std::vector<AuditEntry>> {
+  return read([&](Database& database) {
     return read_log<AuditEntry>(database, "audit", "action", behind_id, limit, filter);
   });
 }
 
 Result<std::optional<ResumeState>> Store::resume_state(std::string_view robot_id) const {
-  return read([&](Database& database) -> Result<std::optional<ResumeState>> {
+  return read([&](Database& database) {
     return select_one<ResumeState>(database, "FROM energy_state WHERE robot_id = ?", robot_id);
   });
 }
 
 Result<std::optional<RequestAnswer>> Store::answer(std::string_view actor, std::string_view key) const {
-  return read([&](Database& database) -> Result<std::optional<RequestAnswer>> {
+  return read([&](Database& database) {
     return select_one<RequestAnswer>(database, "FROM request_answer WHERE actor = ? AND idempotency_key = ?",
                                      actor, key);
   });
@@ -230,7 +229,7 @@ Result<std::optional<Learned>> Store::learned(std::string_view robot_id, std::st
 }
 
 Result<std::vector<Learned>> Store::all_learned(std::string_view topic) const {
-  return read([&](Database& database) -> Result<std::vector<Learned>> {
+  return read([&](Database& database) {
     return select_all<Learned>(database, "FROM learned WHERE topic = ? ORDER BY robot_id", topic);
   });
 }

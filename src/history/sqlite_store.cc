@@ -102,15 +102,14 @@ struct OpenedDatabase {
 
 class SqliteStore final : private OpenedDatabase, public SqlStore {
  public:
-  SqliteStore(const SqliteOptions& options, OpenedDatabase opened)
+  SqliteStore(const std::string& path, const StoreOptions& options, OpenedDatabase opened)
       : OpenedDatabase(std::move(opened)),
         SqlStore(
-            [options] {
-              return std::make_unique<SqliteDatabase>(options.path, OpenMode::read_only,
-                                                      options.busy_timeout_ms);
+            [path, wait = options.busy_timeout_ms] {
+              return std::make_unique<SqliteDatabase>(path, OpenMode::read_only, wait);
             },
             options.readers, greatest_key(*writer)),
-        path_(options.path),
+        path_(path),
         changes_(*writer, options.now_utime_us ? options.now_utime_us : host_utime_us),
         // The first query has opened the journal.
         files_({path_, path_ + "-wal"}) {
@@ -160,13 +159,13 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
   OpenedFiles files_;
 };
 
-Result<OpenedDatabase> open_database(const SqliteOptions& options) {
+Result<OpenedDatabase> open_database(const std::string& path, const StoreOptions& options) {
   // Their descriptors must be closed after SQLite's: closing one releases all locks on the file.
-  TRY_ASSIGN(auto locks, lock_store(options.path));
+  TRY_ASSIGN(auto locks, lock_store(path));
   OpenedDatabase opened;
   opened.locks = std::move(locks);
   opened.writer =
-      std::make_unique<SqliteDatabase>(options.path, OpenMode::read_write_create, options.busy_timeout_ms);
+      std::make_unique<SqliteDatabase>(path, OpenMode::read_write_create, options.busy_timeout_ms);
   // Before the first table is created; an existing store keeps its setting. Nothing is written yet.
   opened.writer->execute("PRAGMA auto_vacuum = INCREMENTAL");
   // The schema first, so that a file which is refused is left exactly as it was.
@@ -177,16 +176,16 @@ Result<OpenedDatabase> open_database(const SqliteOptions& options) {
 
 }  // namespace
 
-Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options) {
+Result<std::unique_ptr<Store>> open_sqlite_store(const std::string& path, const StoreOptions& options) {
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
-    TRY_ASSIGN(auto opened, open_database(options));
-    return std::make_unique<SqliteStore>(options, std::move(opened));
+    TRY_ASSIGN(auto opened, open_database(path, options));
+    return std::make_unique<SqliteStore>(path, options, std::move(opened));
   });
 }
 
-Result<std::shared_ptr<Database>> open_sqlite_tables(const SqliteOptions& options) {
+Result<std::shared_ptr<Database>> open_sqlite_tables(const std::string& path, const StoreOptions& options) {
   return guarded([&]() -> Result<std::shared_ptr<Database>> {
-    TRY_ASSIGN(auto opened, open_database(options));
+    TRY_ASSIGN(auto opened, open_database(path, options));
     const auto held = std::make_shared<OpenedDatabase>(std::move(opened));
     return std::shared_ptr<Database>(held, held->writer.get());
   });

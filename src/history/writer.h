@@ -1,11 +1,18 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <list>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include "base/error.h"
 #include "base/host_clock.h"
@@ -101,8 +108,80 @@ class Writer {
   WriterStatus status() const;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  using Clock = std::chrono::steady_clock;
+
+  // A caller that waits for a command's outcome.
+  struct Waiter {
+    bool queued = true;  // the command may still be withdrawn
+    std::optional<Outcome> outcome;
+    std::condition_variable done;
+  };
+
+  struct Item {
+    std::uint64_t id = 0;  // increasing in the queue's order
+    Command command;
+    std::size_t bytes = 0;
+    Clock::time_point since;
+    std::shared_ptr<Waiter> waiter;  // null when no caller waits
+  };
+  using Place = std::list<Item>::iterator;
+
+  // The batch being committed: the commands of the items, contiguous as apply() requires.
+  struct Batch {
+    std::list<Item> items;
+    std::vector<Command> commands;
+  };
+
+  bool has_room(std::size_t bytes) const;
+  std::optional<std::string> trouble() const;
+  std::uint64_t oldest_id() const;
+  void report_event(const Command& command) const;
+  Place push(Command command, std::shared_ptr<Waiter> waiter);
+  void shed(Command& command);
+  bool merged(Command& command);
+  void forget(const Item& item);
+  void loop();
+  bool take_batch();
+  bool commit();
+  void withdraw_awaited(const Error& why);
+  bool wait_before_retry(const Error& error, std::chrono::milliseconds pause);
+  bool settle(std::vector<Outcome>& outcomes, bool idle, double duration_s);
+  void prune_when_due();
+  void prune_by_age(double hours);
+  std::int64_t prune(const Command& command);
+  void end();
+  static void refuse(Waiter& waiter, Error why);
+  void tell(const Error& error) const;
+
+  Store& store_;
+  const WriterOptions options_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable work_;       // for the writing thread
+  std::condition_variable room_;       // for callers that wait to post
+  std::condition_variable committed_;  // for callers of flush() and stop()
+  std::list<Item> queue_;
+  Batch batch_;                              // changed by the writing thread alone, with the mutex held
+  std::map<MissionKey, Place> checkpoints_;  // the last one that waits, of a mission
+  std::map<std::pair<std::string, std::string>, Place> learned_;  // the one that waits, of a robot and topic
+  std::size_t queued_bytes_ = 0;                                  // waiting and in the batch
+  std::uint64_t last_id_ = 0;
+  std::size_t left_ = 0;                            // commands that the end left uncommitted
+  std::optional<Clock::time_point> attempt_since_;  // a commit runs
+  std::string why_;                                 // the last commit failed; empty: it did not
+  Clock::time_point failing_since_, told_;
+  bool commit_now_ = false;  // a caller waits: commit immediately
+  bool stopping_ = false;
+  bool ended_ = false;
+  Clock::time_point stop_deadline_;
+  WriterStatus status_;
+
+  // The writing thread's own.
+  Clock::time_point last_prune_, distrust_until_;
+  double age_allowance_ = 0, mission_allowance_ = 0, audit_allowance_ = 0;  // that may be dropped by age
+  ClockSteps steps_;
+
+  std::thread thread_;
 };
 
 }  // namespace joulecast::history

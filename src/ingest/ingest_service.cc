@@ -1,273 +1,223 @@
 #include "ingest/ingest_service.h"
 
-#include <atomic>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
-#include <vector>
 
 #include "base/fault_boundary.h"
-#include "base/host_clock.h"
 #include "base/try.h"
 #include "signals/energy_state.h"
 
 namespace joulecast::ingest {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::int64_t live_us = 5'000'000;  // a robot not received from for longer publishes no energy state
 
 }  // namespace
 
-class IngestService::Impl {
- public:
-  Impl(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts, SessionOutputs outputs,
-       Keeping* keeping)
-      : options_(std::move(options)),
-        models_(models),
-        forecasts_(forecasts),
-        outputs_(outputs),
-        signatures_(options_.signatures),
-        keeping_(keeping),
-        pipeline_(options_.session, options_.max_unknown_robots, models, std::move(outputs), keeping) {}
-
-  ~Impl() { stop(); }
-
-  Result<void> start() {
-    TRY(signatures_.read_keys());
-    TRY(pipeline_.recover());
-    TRY_ASSIGN(telemetry::LcmLink link, telemetry::LcmLink::open(options_.lcm_url));
-    link_ = std::make_unique<telemetry::LcmLink>(std::move(link));
-    const auto handler = [this](const telemetry::Received& received) {
-      survive("receiving", [&] {
-        std::optional<InboundMessage> message =
-            decode_message(received.channel, received.data, host_utime_us(), outputs_.counters,
-                           received.sender, &signatures_);
-        if (message) batch_.push_back(std::move(*message));
-      });
-    };
-    TRY(link_->listen(handler, outputs_.counters.datagrams, options_.listen));
-    running_ = true;
-    receiving_ = true;
-    pipeline_.start_reading();
-    receiver_ = std::thread([this] { receive(); });
-    accountant_ = std::thread([this] { account(); });
-    return {};
-  }
-
-  void stop() {
-    if (!running_.exchange(false)) return;
-    link_->wake();
-    receiver_.join();
-    {
-      const std::lock_guard lock(mutex_);
-      draining_ = true;
-    }
-    ready_.notify_one();
-    accountant_.join();
-  }
-
-  void request_mission(const std::string& robot_id, const MissionRequest& request) {
-    {
-      const std::lock_guard lock(mutex_);
-      queue_.push_back({robot_id, request, request.request_utime_us});
-    }
-    ready_.notify_one();
-  }
-
-  IngestStatus status() const {
-    IngestStatus s;
-    {
-      const std::lock_guard lock(mutex_);
-      s.queue_messages = queue_.size();
-      s.error = error_;
-      s.key_error = key_error_;
-    }
-    s.receive_ticks = receive_ticks_;
-    s.account_ticks = account_ticks_;
-    s.receiving = receiving_;
-    return s;
-  }
-
- private:
-  void receive() {
-    while (running_) {
-      ++receive_ticks_;
-      refresh_keys();
-      const Result<int> handled = link_->poll(std::chrono::milliseconds(100));
-      if (!handled) {
-        receiving_ = false;
-        {
-          const std::lock_guard lock(mutex_);
-          error_ = describe(handled.error());
-        }
-        outputs_.warn("", "LCM: " + describe(handled.error()));
-        while (running_) {
-          ++receive_ticks_;
-          std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        }
-        return;
-      }
-      if (batch_.empty()) continue;
-      std::uint64_t dropped = batch_.size();
-      {
-        const std::lock_guard lock(mutex_);
-        survive("receiving", [&] {
-          for (InboundMessage& message : batch_) {
-            message.one_of = thinning(queue_.size(), options_.queue_messages);
-            if (queue_.size() >= options_.queue_messages || !is_chosen(message, message.one_of)) continue;
-            queue_.push_back(std::move(message));
-            --dropped;
-          }
-        });
-      }
-      batch_.clear();
-      ready_.notify_one();
-      report_dropped(dropped);
-    }
-  }
-
-  // Once a minute.
-  void report_dropped(std::uint64_t dropped) {
-    if (dropped == 0) return;
-    outputs_.counters.add(IngestFault::queue_full, dropped);
-    unreported_ += dropped;
-    const auto now = Clock::now();
-    if (now < next_report_) return;
-    next_report_ = now + std::chrono::minutes(1);
-    outputs_.warn(
-        "", "accounting is slower than the robots send: " + std::to_string(std::exchange(unreported_, 0)) +
-                " messages were left out, energy is integrated over longer steps");
-  }
-
-  void refresh_keys() {
-    const std::optional<Result<void>> read = signatures_.refresh();
-    if (!read) return;
-    if (!*read) outputs_.warn("", "the robots' keys stay as they were: " + describe(read->error()));
-    const std::lock_guard lock(mutex_);
-    key_error_ = *read ? "" : describe(read->error());
-  }
-
-  void account() {
-    std::vector<InboundMessage> work;
-    auto next_publish = Clock::now(), next_tick = next_publish, next_energy = next_publish;
-    for (bool last = false; !last;) {
-      ++account_ticks_;
-      {
-        std::unique_lock lock(mutex_);
-        ready_.wait_until(lock, next_publish, [&] { return !queue_.empty() || draining_; });
-        work.swap(queue_);
-        last = draining_ && work.empty();
-      }
-      survive("accounting", [&] { pipeline_.follow_orders(); });
-      for (const InboundMessage& message : work) survive("accounting", [&] { pipeline_.handle(message); });
-      work.clear();
-      if (const std::int64_t step_us = clock_steps_.take_step_us(); step_us != 0)
-        survive("accounting", [&] { on_clock_step(step_us); });
-      const auto now = Clock::now();
-      if (now >= next_tick) {
-        next_tick = now + std::chrono::milliseconds(500);
-        survive("accounting", [&] { pipeline_.tick(host_utime_us()); });
-      }
-      if (now >= next_publish) {
-        next_publish = now + options_.publish_period;
-        survive("accounting", [&] { pipeline_.publish(); });
-      }
-      if (now >= next_energy) {
-        next_energy = now + options_.energy_state_period;
-        survive("accounting", [&] { publish_energy_states(); });
-      }
-    }
-    survive("accounting", [&] { pipeline_.suspend(); });
-  }
-
-  void on_clock_step(std::int64_t step_us) {
-    const std::int64_t now_us = host_utime_us();
-    const std::string step_s = std::to_string(static_cast<double>(step_us) * 1e-6);
-    outputs_.warn("", "the host's clock was set by " + step_s + " s");
-    outputs_.post(history::AppendEvent{{0, now_us, "", "host_clock_step", "{\"step_s\":" + step_s + "}"}});
-    pipeline_.on_host_clock_step(now_us, step_us);
-  }
-
-  void publish_energy_states() {
-    const std::int64_t now = host_utime_us();
-    for (const auto& snapshot : outputs_.fleet.all()) {
-      if (keeping_ != nullptr && keeping_->epoch_of(snapshot->robot_id) == 0) continue;
-      if (!snapshot->has_model || now - snapshot->received_utime_us > live_us ||
-          snapshot->sample.utime_us == 0)
-        continue;
-      const std::shared_ptr<const ModelInForce> model = models_.find(snapshot->robot_id);
-      if (model == nullptr) continue;
-      const forecast::Reach reach = forecasts_.live_reach(model, *snapshot);
-      signals::EnergyState state;
-      state.utime_us = snapshot->sample.utime_us;
-      state.robot_id = snapshot->robot_id;
-      state.mission_id = snapshot->mission_id;
-      state.model_version = snapshot->model_version;
-      state.measured_power_w = snapshot->measured_power_w;
-      state.modelled_power_w = snapshot->modelled_power_w;
-      if (snapshot->accounts.measured_s > 0) {
-        state.measured_energy_j = snapshot->accounts.measured_j;
-        state.unexplained_energy_j = snapshot->accounts.ledger[signals::Term::unexplained];
-      }
-      state.modelled_energy_j = snapshot->accounts.modelled_j;
-      state.recovered_energy_j = snapshot->accounts.ledger[signals::Term::recovered];
-      state.state_of_charge = snapshot->state_of_charge;
-      state.state_of_charge_sd = snapshot->charge.estimate.sd;
-      state.range_m = reach.range_m[1];
-      state.range_band_m = {reach.range_m.front(), reach.range_m.back()};
-      state.run_time_s = reach.run_time_s[1];
-      state.run_time_band_s = {reach.run_time_s.front(), reach.run_time_s.back()};
-      state.winding_temperature_c = snapshot->winding_temperature_c;
-      const auto bytes = telemetry::encode_energy_state(state);
-      if (!bytes) continue;
-      const auto sent =
-          link_->publish(telemetry::channel_of(telemetry::Subject::energy_state, snapshot->robot_id), *bytes);
-      if (!sent) outputs_.warn(snapshot->robot_id, describe(sent.error()));
-    }
-  }
-
-  IngestOptions options_;
-  const ModelRegistry& models_;
-  Forecasts& forecasts_;
-  SessionOutputs outputs_;
-  SignatureGate signatures_;  // the receiver's
-  Keeping* keeping_;
-  Pipeline pipeline_;
-  ClockSteps clock_steps_;  // the accountant's
-  std::unique_ptr<telemetry::LcmLink> link_;
-  std::vector<InboundMessage> batch_;  // the receiver's, as the next two
-  std::uint64_t unreported_ = 0;       // messages left out
-  Clock::time_point next_report_{};
-  mutable std::mutex mutex_;
-  std::condition_variable ready_;
-  std::vector<InboundMessage> queue_;
-  std::string error_, key_error_;
-  bool draining_ = false;
-  std::atomic<bool> running_ = false, receiving_ = false;
-  std::atomic<std::uint64_t> receive_ticks_ = 0, account_ticks_ = 0;
-  std::thread receiver_, accountant_;
-};
-
 IngestService::IngestService(IngestOptions options, const ModelRegistry& models, Forecasts& forecasts,
                              SessionOutputs outputs, Keeping* keeping)
-    : impl_(std::make_unique<Impl>(std::move(options), models, forecasts, std::move(outputs), keeping)) {}
-IngestService::~IngestService() = default;
+    : options_(std::move(options)),
+      models_(models),
+      forecasts_(forecasts),
+      outputs_(outputs),
+      signatures_(options_.signatures),
+      keeping_(keeping),
+      pipeline_(options_.session, options_.max_unknown_robots, models, std::move(outputs), keeping) {}
+
+IngestService::~IngestService() {
+  stop();
+}
+
 Result<void> IngestService::start() {
-  return impl_->start();
+  TRY(signatures_.read_keys());
+  TRY(pipeline_.recover());
+  TRY_ASSIGN(telemetry::LcmLink link, telemetry::LcmLink::open(options_.lcm_url));
+  link_ = std::make_unique<telemetry::LcmLink>(std::move(link));
+  const auto handler = [this](const telemetry::Received& received) {
+    survive("receiving", [&] {
+      std::optional<InboundMessage> message = decode_message(
+          received.channel, received.data, host_utime_us(), outputs_.counters, received.sender, &signatures_);
+      if (message) batch_.push_back(std::move(*message));
+    });
+  };
+  TRY(link_->listen(handler, outputs_.counters.datagrams, options_.listen));
+  running_ = true;
+  receiving_ = true;
+  pipeline_.start_reading();
+  receiver_ = std::thread([this] { receive(); });
+  accountant_ = std::thread([this] { account(); });
+  return {};
 }
+
 void IngestService::stop() {
-  impl_->stop();
+  if (!running_.exchange(false)) return;
+  link_->wake();
+  receiver_.join();
+  {
+    const std::lock_guard lock(mutex_);
+    draining_ = true;
+  }
+  ready_.notify_one();
+  accountant_.join();
 }
+
 void IngestService::request_mission(const std::string& robot_id, const MissionRequest& request) {
-  impl_->request_mission(robot_id, request);
+  {
+    const std::lock_guard lock(mutex_);
+    queue_.push_back({robot_id, request, request.request_utime_us});
+  }
+  ready_.notify_one();
 }
+
 IngestStatus IngestService::status() const {
-  return impl_->status();
+  IngestStatus s;
+  {
+    const std::lock_guard lock(mutex_);
+    s.queue_messages = queue_.size();
+    s.error = error_;
+    s.key_error = key_error_;
+  }
+  s.receive_ticks = receive_ticks_;
+  s.account_ticks = account_ticks_;
+  s.receiving = receiving_;
+  return s;
+}
+
+void IngestService::receive() {
+  while (running_) {
+    ++receive_ticks_;
+    refresh_keys();
+    const Result<int> handled = link_->poll(std::chrono::milliseconds(100));
+    if (!handled) {
+      receiving_ = false;
+      {
+        const std::lock_guard lock(mutex_);
+        error_ = describe(handled.error());
+      }
+      outputs_.warn("", "LCM: " + describe(handled.error()));
+      while (running_) {
+        ++receive_ticks_;
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      }
+      return;
+    }
+    if (batch_.empty()) continue;
+    std::uint64_t dropped = batch_.size();
+    {
+      const std::lock_guard lock(mutex_);
+      survive("receiving", [&] {
+        for (InboundMessage& message : batch_) {
+          message.one_of = thinning(queue_.size(), options_.queue_messages);
+          if (queue_.size() >= options_.queue_messages || !is_chosen(message, message.one_of)) continue;
+          queue_.push_back(std::move(message));
+          --dropped;
+        }
+      });
+    }
+    batch_.clear();
+    ready_.notify_one();
+    report_dropped(dropped);
+  }
+}
+
+// Once a minute.
+void IngestService::report_dropped(std::uint64_t dropped) {
+  if (dropped == 0) return;
+  outputs_.counters.add(IngestFault::queue_full, dropped);
+  unreported_ += dropped;
+  const auto now = Clock::now();
+  if (now < next_report_) return;
+  next_report_ = now + std::chrono::minutes(1);
+  outputs_.warn(
+      "", "accounting is slower than the robots send: " + std::to_string(std::exchange(unreported_, 0)) +
+              " messages were left out, energy is integrated over longer steps");
+}
+
+void IngestService::refresh_keys() {
+  const std::optional<Result<void>> read = signatures_.refresh();
+  if (!read) return;
+  if (!*read) outputs_.warn("", "the robots' keys stay as they were: " + describe(read->error()));
+  const std::lock_guard lock(mutex_);
+  key_error_ = *read ? "" : describe(read->error());
+}
+
+void IngestService::account() {
+  std::vector<InboundMessage> work;
+  auto next_publish = Clock::now(), next_tick = next_publish, next_energy = next_publish;
+  for (bool last = false; !last;) {
+    ++account_ticks_;
+    {
+      std::unique_lock lock(mutex_);
+      ready_.wait_until(lock, next_publish, [&] { return !queue_.empty() || draining_; });
+      work.swap(queue_);
+      last = draining_ && work.empty();
+    }
+    survive("accounting", [&] { pipeline_.follow_orders(); });
+    for (const InboundMessage& message : work) survive("accounting", [&] { pipeline_.handle(message); });
+    work.clear();
+    if (const std::int64_t step_us = clock_steps_.take_step_us(); step_us != 0)
+      survive("accounting", [&] { on_clock_step(step_us); });
+    const auto now = Clock::now();
+    if (now >= next_tick) {
+      next_tick = now + std::chrono::milliseconds(500);
+      survive("accounting", [&] { pipeline_.tick(host_utime_us()); });
+    }
+    if (now >= next_publish) {
+      next_publish = now + options_.publish_period;
+      survive("accounting", [&] { pipeline_.publish(); });
+    }
+    if (now >= next_energy) {
+      next_energy = now + options_.energy_state_period;
+      survive("accounting", [&] { publish_energy_states(); });
+    }
+  }
+  survive("accounting", [&] { pipeline_.suspend(); });
+}
+
+void IngestService::on_clock_step(std::int64_t step_us) {
+  const std::int64_t now_us = host_utime_us();
+  const std::string step_s = std::to_string(static_cast<double>(step_us) * 1e-6);
+  outputs_.warn("", "the host's clock was set by " + step_s + " s");
+  outputs_.post(history::AppendEvent{{0, now_us, "", "host_clock_step", "{\"step_s\":" + step_s + "}"}});
+  pipeline_.on_host_clock_step(now_us, step_us);
+}
+
+void IngestService::publish_energy_states() {
+  const std::int64_t now = host_utime_us();
+  for (const auto& snapshot : outputs_.fleet.all()) {
+    if (keeping_ != nullptr && keeping_->epoch_of(snapshot->robot_id) == 0) continue;
+    if (!snapshot->has_model || now - snapshot->received_utime_us > live_us || snapshot->sample.utime_us == 0)
+      continue;
+    const std::shared_ptr<const ModelInForce> model = models_.find(snapshot->robot_id);
+    if (model == nullptr) continue;
+    const forecast::Reach reach = forecasts_.live_reach(model, *snapshot);
+    signals::EnergyState state;
+    state.utime_us = snapshot->sample.utime_us;
+    state.robot_id = snapshot->robot_id;
+    state.mission_id = snapshot->mission_id;
+    state.model_version = snapshot->model_version;
+    state.measured_power_w = snapshot->measured_power_w;
+    state.modelled_power_w = snapshot->modelled_power_w;
+    if (snapshot->accounts.measured_s > 0) {
+      state.measured_energy_j = snapshot->accounts.measured_j;
+      state.unexplained_energy_j = snapshot->accounts.ledger[signals::Term::unexplained];
+    }
+    state.modelled_energy_j = snapshot->accounts.modelled_j;
+    state.recovered_energy_j = snapshot->accounts.ledger[signals::Term::recovered];
+    state.state_of_charge = snapshot->state_of_charge;
+    state.state_of_charge_sd = snapshot->charge.estimate.sd;
+    state.range_m = reach.range_m[1];
+    state.range_band_m = {reach.range_m.front(), reach.range_m.back()};
+    state.run_time_s = reach.run_time_s[1];
+    state.run_time_band_s = {reach.run_time_s.front(), reach.run_time_s.back()};
+    state.winding_temperature_c = snapshot->winding_temperature_c;
+    const auto bytes = telemetry::encode_energy_state(state);
+    if (!bytes) continue;
+    const auto sent =
+        link_->publish(telemetry::channel_of(telemetry::Subject::energy_state, snapshot->robot_id), *bytes);
+    if (!sent) outputs_.warn(snapshot->robot_id, describe(sent.error()));
+  }
 }
 
 }  // namespace joulecast::ingest

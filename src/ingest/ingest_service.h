@@ -1,11 +1,16 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
-#include <functional>
+#include <condition_variable>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include "base/error.h"
+#include "base/host_clock.h"
 #include "ingest/forecasts.h"
 #include "ingest/pipeline.h"
 #include "ingest/signature_gate.h"
@@ -53,8 +58,35 @@ class IngestService {
   void request_mission(const std::string& robot_id, const MissionRequest& request);
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  using Clock = std::chrono::steady_clock;
+
+  void receive();
+  void report_dropped(std::uint64_t dropped);
+  void refresh_keys();
+  void account();
+  void on_clock_step(std::int64_t step_us);
+  void publish_energy_states();
+
+  IngestOptions options_;
+  const ModelRegistry& models_;
+  Forecasts& forecasts_;
+  SessionOutputs outputs_;
+  SignatureGate signatures_;  // the receiver's
+  Keeping* keeping_;
+  Pipeline pipeline_;
+  ClockSteps clock_steps_;  // the accountant's
+  std::unique_ptr<telemetry::LcmLink> link_;
+  std::vector<InboundMessage> batch_;  // the receiver's, as the next two
+  std::uint64_t unreported_ = 0;       // messages left out
+  Clock::time_point next_report_{};
+  mutable std::mutex mutex_;
+  std::condition_variable ready_;
+  std::vector<InboundMessage> queue_;
+  std::string error_, key_error_;
+  bool draining_ = false;
+  std::atomic<bool> running_ = false, receiving_ = false;
+  std::atomic<std::uint64_t> receive_ticks_ = 0, account_ticks_ = 0;
+  std::thread receiver_, accountant_;
 };
 
 }  // namespace joulecast::ingest

@@ -106,17 +106,7 @@ std::vector<Contradiction> stored_contradictions(const history::Store& store, co
 }
 
 void RobotReader::start() {
-  running_ = true;
-  thread_ = std::thread([this] { run(); });
-}
-
-void RobotReader::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    running_ = false;
-  }
-  wake_.notify_one();
-  if (thread_.joinable()) thread_.join();
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 void RobotReader::want(const std::string& robot_id, history::Epoch epoch) {
@@ -129,7 +119,7 @@ void RobotReader::want(const std::string& robot_id, history::Epoch epoch) {
 
 std::vector<StoredRobot> RobotReader::take() {
   std::unique_lock lock(mutex_);
-  while (!running_ && !wanted_.empty() && read_next(lock)) {
+  while (!thread_.joinable() && !wanted_.empty() && read_next(lock)) {
   }
   return std::exchange(done_, {});
 }
@@ -150,15 +140,10 @@ bool RobotReader::read_next(std::unique_lock<std::mutex>& lock) {
   return true;
 }
 
-void RobotReader::run() {
+void RobotReader::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (running_) {
-    if (wanted_.empty()) {
-      wake_.wait(lock);
-    } else if (!read_next(lock)) {
-      wake_.wait_for(lock, read_again, [this] { return !running_; });
-    }
-  }
+  while (wake_.wait(lock, stop, [this] { return !wanted_.empty(); }) && !stop.stop_requested())
+    if (!read_next(lock)) wake_.wait_for(lock, stop, read_again, [] { return false; });
 }
 
 }  // namespace joulecast::ingest

@@ -57,13 +57,12 @@ class RobotReader {
  public:
   using Read = std::function<Result<StoredRobot>(const std::string& robot_id)>;
   explicit RobotReader(Read read) : read_(std::move(read)) {}
-  ~RobotReader() { stop(); }
   RobotReader(const RobotReader&) = delete;
   RobotReader& operator=(const RobotReader&) = delete;
 
   void start();
   // What was not read yet is read by take().
-  void stop();
+  void stop() { thread_ = {}; }
 
   void want(const std::string& robot_id, history::Epoch epoch);
   // Those read since the last call. Without the thread they are read now.
@@ -74,17 +73,16 @@ class RobotReader {
     std::string robot_id;
     history::Epoch epoch = 0;
   };
-  void run();
+  void run(const std::stop_token& stop);
   // False if the store could not be read; then the robot is wanted again.
   bool read_next(std::unique_lock<std::mutex>& lock);
 
   const Read read_;
   std::mutex mutex_;
-  std::condition_variable wake_;
-  bool running_ = false;
+  std::condition_variable_any wake_;
   std::deque<Wanted> wanted_;
   std::vector<StoredRobot> done_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace joulecast::ingest

@@ -30,6 +30,8 @@ constexpr double time_tolerance = 1e-4;
 // size of cells.
 constexpr int most_rounds = 3;
 constexpr std::size_t most_growth = 8;
+constexpr double near_limits = 0.01;  // of motors, in the middle of a cell whose knots are looked at
+constexpr double at_knots = std::numeric_limits<double>::infinity();  // parts of a cell: one for each knot
 
 double sum_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
@@ -49,18 +51,6 @@ std::vector<double> lost_at_corners_s(const SpeedGrid& grid, const std::vector<d
 
 std::string number(double x) {
   return std::to_string(x);
-}
-
-// In how many parts each cell is to be divided at least, so that motors keep their limits in its middle as
-// well: what exceeds them there falls with the square of the cell.
-std::vector<double> least_parts(const SpeedGrid& grid, const std::vector<double>& z, double least) {
-  std::vector<double> parts(grid.cells(), least);
-  for (std::size_t k = 0; k < grid.cells(); ++k) {
-    const double v = std::sqrt(0.5 * (z[k] + z[k + 1])), q = (z[k + 1] - z[k]) / (2 * grid.step[k]);
-    const double beyond = (motor_use(grid, grid.load(k), v, q) - 1) / over_between_rows;
-    if (beyond > 1) parts[k] = std::max(least, std::ceil(std::sqrt(beyond)));
-  }
-  return parts;
 }
 
 // Power of a robot at standstill that must overcome its friction [W].
@@ -244,7 +234,7 @@ void RunPlanner::add_floor(SpeedGrid& grid) const {
   const double v = problem_->limits.least_speed_m_s;
   double most = std::min(grid.acceleration_limit, unbound_m_s2);
   for (std::size_t k = 0; k < grid.loads.size(); ++k) {
-    const auto fits = [&](double q) { return motor_use(grid, grid.load(k), v, q) <= 1; };
+    const auto fits = [&](double q) { return motor_use(grid, grid.load(k), v, q).most() <= 1; };
     if (!fits(most) && fits(0)) most = last_that(fits, 0, most, 40);
   }
   grid.floor = v * v;
@@ -320,17 +310,10 @@ Result<void> RunPlanner::check_feasible() const {
                           : std::string("the other limits allow"),
                     std::sqrt(bound ? *lowest : fast), bound ? bend : where));
   }
-  // Which end speed would do: the one that the other end's speed can just reach.
-  SpeedGrid open = grid;
-  open.end = open.ceiling.back();
-  const SpeedEnvelope reach = speed_envelope(open);
-  if (reach.fastest.front() >= open.start * (1 - 1e-9)) {
-    const double most = std::sqrt(reach.fastest.back());
-    if (end_ > most) {
-      return fail(
-          Fault::infeasible, "end_speed_m_s",
-          "is " + number(end_) + ", the way is too short: at most " + number(most) + " can be reached");
-    }
+  if (e.broken_at == grid.cells()) {
+    return fail(Fault::infeasible, "end_speed_m_s",
+                "is " + number(end_) + ", the way is too short: at most " +
+                    number(std::sqrt(e.fastest.back())) + " can be reached");
   }
   const double least_end =
       std::sqrt(std::max(0.0, grid.start - 2 * grid.acceleration_limit * run_->length()));
@@ -339,19 +322,16 @@ Result<void> RunPlanner::check_feasible() const {
         Fault::infeasible, "end_speed_m_s",
         "is " + number(end_) + ", the way is too short to brake: at least " + number(least_end) + " remains");
   }
-  open.end = grid.end;
-  open.start = 0;
-  const SpeedEnvelope back = speed_envelope(open);
-  SpeedGrid from_anywhere = grid;
-  from_anywhere.start = from_anywhere.ceiling.front();
-  const double most_start = std::sqrt(speed_envelope(from_anywhere).fastest.front());
-  if (start_ > most_start) {
+  if (e.broken_at == 0) {
     return fail(Fault::infeasible, "start_speed_m_s",
-                "is " + number(start_) + ", the limits allow at most " + number(most_start) + " on this way");
+                "is " + number(start_) + ", the limits allow at most " +
+                    number(std::sqrt(e.fastest.front())) + " on this way");
   }
+  SpeedGrid from_rest = grid;
+  from_rest.start = 0;
   return fail(Fault::infeasible, "limits",
               "no speed satisfies them " + number(where) + " along the way" +
-                  (back.feasible ? "; starting from rest would" : ""));
+                  (speed_envelope(from_rest).feasible ? "; starting from rest would" : ""));
 }
 
 std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
@@ -566,8 +546,9 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
       solver->start_from(start);
     } else {
       start = solver->envelope().fastest;
-      motors_bind =
-          duration_of(grid, start) > duration_of(grid, fastest_without_motors(grid)) * (1 + coarse_tolerance);
+      motors_bind = duration_of(grid, start) >
+                    duration_of(grid, fastest_within(grid, grid.ceiling, grid.acceleration_limit)) *
+                        (1 + coarse_tolerance);
     }
     SpeedSolution s;
     s.z = start, s.duration_s = duration_of(grid, start);
@@ -582,7 +563,7 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
     const double most_s = time_tolerance * s.duration_s;
-    const std::vector<double> parts = least_parts(grid, s.z, 1);
+    const std::vector<double> parts = least_parts(grid, nodes, s.z, 1);
     fastest.nodes = nodes, fastest.solution = std::move(s);
     if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
     nodes = split(fastest.nodes, lost_s, 0.8 * most_s, parts);
@@ -668,9 +649,34 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   return answer;
 }
 
+// In how many parts each cell is to be divided at least, so that motors keep their limits between its ends as
+// well: in its middle, what exceeds them falls with the square of the cell; at knots, where the torque jumps,
+// it lasts until they are nodes.
+std::vector<double> RunPlanner::least_parts(const SpeedGrid& grid, const std::vector<double>& nodes,
+                                            const std::vector<double>& z, double least) const {
+  std::vector<double> parts(grid.cells(), least);
+  for (std::size_t k = 0; k < grid.cells(); ++k) {
+    const double q = (z[k + 1] - z[k]) / (2 * grid.step[k]);
+    const auto beyond = [&](const WheelLoads& loads, double way) {
+      return motor_use(grid, loads, std::sqrt(z[k] + 2 * q * (way - nodes[k])), q).most() - 1;
+    };
+    const double middle = beyond(grid.load(k), nodes[k] + 0.5 * grid.step[k]);
+    if (middle > over_between_rows)
+      parts[k] = std::max(least, std::ceil(std::sqrt(middle / over_between_rows)));
+    if (grid.end_loads.empty() || middle < -near_limits) continue;
+    for (auto knot = knot_after(nodes[k]); knot->way < nodes[k + 1] && parts[k] != at_knots; ++knot) {
+      for (const double side : {-1e-9, 0.0}) {
+        const WheelLoads here = loads_->at(*run_, *knot, run_->curvature_slope(knot->way + side));
+        if (beyond(here, knot->way) > over_between_rows) parts[k] = at_knots;
+      }
+    }
+  }
+  return parts;
+}
+
 // Divides cells into parts so that their losses add up to at most `most`. A cell's loss is inversely
 // proportional to the number of its parts, so that the fewest nodes result from parts proportional to the
-// square root of the loss. New nodes are at knots where some are near: between knots loads change evenly.
+// square root of the loss. New nodes are at knots where some are near, for between knots loads change evenly.
 std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const std::vector<double>& lost,
                                       double most, const std::vector<double>& least) const {
   constexpr double most_parts = 8;
@@ -681,10 +687,12 @@ std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const st
     const double wanted = std::ceil(std::sqrt(lost[k]) * roots / most - 0.5);
     const double parts = nodes.size() > most_cells ? 1 : std::min(std::max(wanted, least[k]), most_parts),
                  part = (nodes[k + 1] - nodes[k]) / parts;
-    for (double i = 1; i < parts; ++i) {
+    auto knot = knot_after(nodes[k]);
+    for (; least[k] == at_knots && knot->way < nodes[k + 1]; ++knot) finer.push_back(knot->way);
+    for (double i = 1; i < parts && least[k] != at_knots; ++i) {
       const double even = nodes[k] + part * i;
-      const auto knot = std::ranges::lower_bound(run_->knots, even - 0.5 * part, {}, &Knot::way);
-      const double way = knot != run_->knots.end() && knot->way < even + 0.5 * part ? knot->way : even;
+      while (knot->way < even - 0.5 * part) ++knot;
+      const double way = knot->way < even + 0.5 * part ? knot->way : even;
       if (way > finer.back() && way < nodes[k + 1]) finer.push_back(way);
     }
     finer.push_back(nodes[k + 1]);
@@ -750,7 +758,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     lost = lost_j(s, driven, price_w);
     const double most = lost_tolerance * std::fabs(s.cost_j);
     const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
-    const std::vector<double> parts = least_parts(solver_->grid(), s.z, refined_ ? 1 : 2);
+    const std::vector<double> parts = least_parts(solver_->grid(), nodes_, s.z, refined_ ? 1 : 2);
     if (refined_ && (grown || (sum_of(lost) <= most && std::ranges::max(parts) == 1))) break;
     const std::vector<double> coarse_nodes = nodes_;
     const auto rebuild = [&](std::vector<double> onto) {

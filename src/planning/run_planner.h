@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -98,6 +99,11 @@ class RunPlanner {
   void add_floor(SpeedGrid& grid) const;
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
+  std::vector<double> least_parts(const SpeedGrid& grid, const std::vector<double>& nodes,
+                                  const std::vector<double>& z, double least) const;
+  std::vector<Knot>::const_iterator knot_after(double way) const {
+    return std::ranges::upper_bound(run_->knots, way, {}, &Knot::way);
+  }
   std::vector<double> split(const std::vector<double>& nodes, const std::vector<double>& lost, double most,
                             const std::vector<double>& least) const;
   void add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid) const;

@@ -9,7 +9,7 @@
 namespace joulecast::planning {
 namespace {
 
-constexpr int bisections = 40;
+constexpr double just_below = 1e-9;  // a limit: relative, of the squared speed
 
 // Torque of a wheel without smoothing.
 double torque_of(const WheelLoad& w, double v, double q) {
@@ -23,20 +23,23 @@ double torque_of(const WheelLoad& w, double v, double q) {
 
 }  // namespace
 
-double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q) {
-  double most = 0;
+MotorUse motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q) {
+  MotorUse use;
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = loads[s];
     const Electric& e = grid.electric;
     const auto reach = [&](double t) {
       const double volts =
           e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
-      most = std::max({most, std::fabs(t) / grid.torque_limit_nm, std::fabs(volts) / grid.voltage_limit_v});
+      for (const double share : {t / grid.torque_limit_nm, volts / grid.voltage_limit_v}) {
+        double& most = share * w.inertia < 0 ? use.slowing : use.rising;
+        most = std::max(most, std::fabs(share));
+      }
     };
     reach(torque_of(w, v, q));
     if (w.creep != 0) reach(torque_of(w.rolling(), v, q));
   }
-  return most;
+  return use;
 }
 
 Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share) {
@@ -69,17 +72,8 @@ double mean_speed(double z0, double z1) {
 }
 
 std::vector<double> floor_profile(const SpeedGrid& grid) {
-  const std::size_t n = grid.cells();
-  std::vector<double> floor(n + 1, 0);
-  if (grid.floor == 0) return floor;
-  double way = 0, rest = 0;
-  for (const double step : grid.step) rest += step;
-  for (std::size_t k = 0; k <= n; ++k) {
-    floor[k] = std::min({grid.floor, grid.start + 2 * grid.floor_acceleration * way,
-                         grid.end + 2 * grid.floor_acceleration * rest});
-    if (k < n) way += grid.step[k], rest -= grid.step[k];
-  }
-  return floor;
+  const std::vector<double> floor(grid.cells() + 1, grid.floor);
+  return grid.floor == 0 ? floor : fastest_within(grid, floor, grid.floor_acceleration);
 }
 
 std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration) {
@@ -105,14 +99,12 @@ double duration_of(const SpeedGrid& grid, const std::vector<double>& z) {
   return sum;
 }
 
-std::vector<double> fastest_without_motors(const SpeedGrid& grid) {
-  std::vector<double> fastest = grid.ceiling;
+std::vector<double> fastest_within(const SpeedGrid& grid, std::vector<double> fastest, double acceleration) {
   fastest.front() = grid.start, fastest.back() = grid.end;
-  if (!std::isfinite(grid.acceleration_limit)) return fastest;
-  const auto rise = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
   for (std::size_t k = 0; k < grid.cells(); ++k)
-    fastest[k + 1] = std::min(fastest[k + 1], fastest[k] + rise(k));
-  for (std::size_t k = grid.cells(); k-- > 0;) fastest[k] = std::min(fastest[k], fastest[k + 1] + rise(k));
+    fastest[k + 1] = std::min(fastest[k + 1], fastest[k] + 2 * grid.step[k] * acceleration);
+  for (std::size_t k = grid.cells(); k-- > 0;)
+    fastest[k] = std::min(fastest[k], fastest[k + 1] + 2 * grid.step[k] * acceleration);
   return fastest;
 }
 
@@ -123,42 +115,36 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.front() = grid.start;
   e.fastest.back() = grid.end;
 
-  const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
   // Within a cell, motor use lies between its values at the two ends.
-  const auto allowed = [&](std::size_t cell, double z0, double z1) {
+  const auto use = [&](std::size_t cell, double z0, double z1) {
     const double q = (z1 - z0) / (2 * grid.step[cell]);
-    return motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q) <= 1 &&
-           motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q) <= 1;
+    const MotorUse first = motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q),
+                   last = motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q);
+    return MotorUse{std::max(first.rising, last.rising), std::max(first.slowing, last.slowing)};
   };
-  // Where a steady speed is already too much for the motors, the ceiling is lower.
-  if (motors) {
-    for (std::size_t k = 0; k <= n; ++k) {
-      const std::size_t before = k > 0 ? k - 1 : 0, after = std::min(k, n - 1);
-      const auto fits = [&](double z) {
-        return motor_use(grid, grid.load(before, 1), std::sqrt(z), 0) <= 1 &&
-               motor_use(grid, grid.load(after, 0), std::sqrt(z), 0) <= 1;
-      };
-      if (!fits(e.fastest[k])) e.fastest[k] = last_that(fits, 0, e.fastest[k], bisections);
-    }
-  }
-  // The largest z at the far end of a cell that can be reached by speeding up from the near end; bisection
-  // only where motors bind. Slowing down is the other sweep's concern.
-  const auto reach = [&](std::size_t cell, double near, double cap, bool forward) {
-    if (cap <= near) return cap;
-    const double top = std::isfinite(grid.acceleration_limit)
-                           ? std::min(cap, near + 2 * grid.step[cell] * grid.acceleration_limit)
-                           : cap;
-    const auto fits = [&](double far) {
-      return forward ? allowed(cell, near, far) : allowed(cell, far, near);
+  const auto most_change = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
+  const auto highest = [](auto&& excess, double low, double high) {
+    const double at_high = excess(high), at_low = at_high > 0 ? excess(low) : 0;
+    if (!(at_high > 0)) return high;
+    return at_low < 0 ? (1 - just_below) * zero_between(excess, low, at_low, high, at_high) : low;
+  };
+  // The fastest at the far end of a cell that its near end and the motors allow.
+  const auto fastest_after = [&](std::size_t cell, double near) {
+    return highest([&](double far) { return use(cell, near, far).rising - 1; },
+                   std::max(0.0, near - most_change(cell)),
+                   std::min(e.fastest[cell + 1], near + most_change(cell)));
+  };
+  // From which speeds a cell can be left within its bound, which may take slowing down. Then those from which
+  // the start leads on as fast as possible (Pham & Pham, IEEE Trans. Robot. 34 (2018), sec. III).
+  for (std::size_t k = n; k-- > 0;) {
+    const auto excess = [&](double near) {
+      const MotorUse top = use(k, near, e.fastest[k + 1]);
+      const bool sure = top.slowing > 1 || top.rising <= 1;
+      return sure ? top.slowing - 1 : use(k, near, fastest_after(k, near)).most() - 1;
     };
-    if (!motors || fits(top)) return top;
-    const bool steady = fits(near);
-    return last_that(fits, steady ? near : 0, steady ? top : near, bisections);
-  };
-  for (int sweep = 0; sweep < (motors ? 2 : 1); ++sweep) {
-    for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = reach(k, e.fastest[k], e.fastest[k + 1], true);
-    for (std::size_t k = n; k-- > 0;) e.fastest[k] = reach(k, e.fastest[k + 1], e.fastest[k], false);
+    e.fastest[k] = highest(excess, 0, std::min(e.fastest[k], e.fastest[k + 1] + most_change(k)));
   }
+  for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = fastest_after(k, e.fastest[k]);
   e.slowest = slowest_profile(grid, grid.acceleration_limit);
   const double slack = 1e-9;
   if (e.fastest.front() < grid.start * (1 - slack) || e.fastest.back() < grid.end * (1 - slack)) {

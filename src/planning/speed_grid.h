@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -30,8 +31,13 @@ struct SpeedGrid {
   }
 };
 
-// The most that a motor is used of its current and voltage limits at a speed and an acceleration.
-double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q);
+// The most that a motor is used of its current and voltage limits at a speed and an acceleration: of those
+// that less acceleration relieves, and of those that more does.
+struct MotorUse {
+  double rising = 0, slowing = 0;
+  double most() const { return std::max(rising, slowing); }
+};
+MotorUse motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q);
 
 // Which limits of the motors speeds up to `v` within the acceleration limit could reach, by side and sign
 // (positive, negative); of voltage, within the limit of torque.
@@ -51,8 +57,8 @@ struct SpeedEnvelope {
 };
 SpeedEnvelope speed_envelope(const SpeedGrid& grid);
 
-// The fastest that ceilings and the limit of acceleration leave.
-std::vector<double> fastest_without_motors(const SpeedGrid& grid);
+// The fastest below a ceiling between the ends and with an acceleration within a bound.
+std::vector<double> fastest_within(const SpeedGrid& grid, std::vector<double> ceiling, double acceleration);
 
 // The least z of a grid with a floor, 0 without.
 std::vector<double> floor_profile(const SpeedGrid& grid);

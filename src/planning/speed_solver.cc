@@ -96,7 +96,7 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
   for (const WheelLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
-  const std::vector<double> fastest = fastest_without_motors(grid_);
+  const std::vector<double> fastest = fastest_within(grid_, grid_.ceiling, grid_.acceleration_limit);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = k > 0 ? bits(of_ceiling) : 0;
     if (std::isfinite(grid_.acceleration_limit)) mask |= bits(of_acceleration);
@@ -407,17 +407,7 @@ void SpeedSolver::solve_step() {
 std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   const std::size_t n = grid_.cells();
   const Electric& e = grid_.electric;
-  // Both profiles may press against the same bound; the lower one is drawn with less acceleration.
-  const std::vector<double>& fastest = envelope().fastest;
-  std::vector<double> slowest = envelope().slowest;
-  if (grid_.start > 0 || grid_.end > 0) {
-    for (double part : {0.3, 0.6, 0.8, 0.9, 0.97, 0.99, 0.999}) {
-      slowest = slowest_profile(grid_, part * grid_.acceleration_limit);
-      bool below = true;
-      for (std::size_t k = 1; k < n; ++k) below = below && slowest[k] < fastest[k];
-      if (below) break;
-    }
-  }
+  const std::vector<double>&fastest = envelope().fastest, &slowest = envelope().slowest;
   const double top = *std::max_element(fastest.begin(), fastest.end());
   double standing = idle_, viscous = 1e-300, losses = 0;
   for (std::size_t s : {0u, 1u}) {
@@ -426,26 +416,28 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   }
   // Without a limit on acceleration the fastest profile jumps; start on one with a copper loss equal to the
   // idle power.
-  std::vector<double> gentle(n + 1, std::numeric_limits<double>::infinity());
-  if (!std::isfinite(grid_.acceleration_limit) && losses > 0) {
-    const double a = std::sqrt(std::max(standing, 1e-3) / losses);
-    double way = 0, rest = 0;
-    for (double h : grid_.step) rest += h;
-    for (std::size_t k = 0; k <= n; ++k) {
-      gentle[k] = std::min(grid_.start + 2 * a * way, grid_.end + 2 * a * rest);
-      if (k < n) way += grid_.step[k], rest -= grid_.step[k];
-    }
-  }
+  std::vector<double> gentle = fastest;
+  if (!std::isfinite(grid_.acceleration_limit) && losses > 0)
+    gentle = fastest_within(grid_, grid_.ceiling, std::sqrt(std::max(standing, 1e-3) / losses));
   std::vector<double> z(n + 1);
   z[0] = grid_.start, z[n] = grid_.end;
   double share = wanted.value_or(std::clamp(standing / viscous / top, 0.02, 0.85));
-  for (int attempt = 0; attempt < 40; ++attempt) {
+  for (int attempt = 0; attempt < 10; ++attempt) {
     for (std::size_t k = 1; k < n; ++k) {
       const double top_here = std::min(fastest[k], std::max(gentle[k], 2 * slowest[k]));
       z[k] = slowest[k] + share * (top_here - slowest[k]);
     }
-    if (inside(z)) break;
+    if (inside(z)) return z;
     share = 0.7 * share + (attempt % 2 ? 0.0 : 0.29);
+  }
+  // Between two profiles there may be none that motors can follow: the fastest within a part of the limits.
+  for (const double part : {0.9, 0.99, 0.999, 0.9999}) {
+    SpeedGrid tight = grid_;
+    for (std::size_t k = 1; k < n; ++k) tight.ceiling[k] *= part;
+    for (double* limit : {&tight.acceleration_limit, &tight.torque_limit_nm, &tight.voltage_limit_v})
+      *limit *= part;
+    z = speed_envelope(tight).fastest;
+    if (z[0] == grid_.start && z[n] == grid_.end && inside(z)) break;
   }
   return z;
 }

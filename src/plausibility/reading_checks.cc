@@ -93,8 +93,8 @@ void check_held(const CheckContext& c, Checks& checks) {
   if (!channels.empty())
     add_check(
         checks, "held_samples", channels, {longest}, false,
-        "Readings are repeated in rows that come every {:.3g} s: {} is new; rows between contain no new "
-        "measurement.",
+        "Rows come every {:.3g} s and repeat readings; new ones come less often: {}. Rows between contain no "
+        "new measurement.",
         c.period_s(), says);
 }
 

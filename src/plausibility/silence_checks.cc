@@ -168,7 +168,7 @@ void check_unsigned(const CheckContext& c, std::size_t first, Checks& checks) {
   if (sides.empty() || (sides.size() == 1 && wheels_look_wrong(c))) return;
   const std::string channel = sides.size() == 2 ? field : sides.front();
   add_check(checks, field + "_unsigned", channel, backward, true,
-            "{} is positive whichever way the wheel turns, {} on the average while it turns backward: its "
+            "{} is positive whichever way the wheel turns, {} on average while it turns backward: its "
             "sign is lost; joulecast expects it positive driving forward.",
             channel, with_interval(backward));
 }
@@ -186,11 +186,10 @@ void check_battery_swap(const CheckContext& c, Checks& checks) {
   const bool voltage_is_none =
       std::fabs(volts.mean()) < supply_share * nominal || std::fabs(volts.mean()) > nominal / supply_share;
   if (!current_is_voltage || !voltage_is_none) return;
-  add_check(
-      checks, "battery_swapped", "battery_voltage, battery_current", {amps.mean() / nominal}, true,
-      "battery_voltage is {:.3g} V on the average and battery_current {:.3g} A, always near the nominal "
-      "{:.3g} V: they look swapped; joulecast expects V, and A that are positive while discharging.",
-      volts.mean(), amps.mean(), nominal)
+  add_check(checks, "battery_swapped", "battery_voltage, battery_current", {amps.mean() / nominal}, true,
+            "battery_voltage is {:.3g} V on average and battery_current {:.3g} A, always near the nominal "
+            "{:.3g} V: they look swapped; joulecast expects V, and A that are positive while discharging.",
+            volts.mean(), amps.mean(), nominal)
       .swapped = true;
 }
 

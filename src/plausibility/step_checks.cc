@@ -109,11 +109,12 @@ void check_steps(const CheckContext& c, Checks& checks) {
     strongest = std::fabs(step->change.value) / step->change.sd;
     const std::size_t first = series.mission[step->first], last = series.mission[step->first - 1];
     Checks one;
-    add_check(one, "step_between_missions", series.channel, step->change, false,
-              "From mission {} on, {} {:.4g} instead of {:.4g} times the file's ({:+.1f} %), and was so "
-              "until {}: diagnose the missions on each side separately.",
-              c.seen[first].mission_id, name, step->after, step->before, 100 * step->change.value,
-              c.seen[last].mission_id)
+    add_check(
+        one, "step_between_missions", series.channel, step->change, false,
+        "From mission {} on, {} {:.4g} times the file's; until {} {:.4g} times ({:+.1f} %): diagnose the "
+        "missions before and after separately.",
+        c.seen[first].mission_id, name, step->after, c.seen[last].mission_id, step->before,
+        100 * step->change.value)
         .first_mission = first;
     check = one.front();
   }

@@ -22,7 +22,6 @@
 namespace joulecast::telemetry {
 namespace {
 
-constexpr std::size_t batch = 64;
 constexpr std::size_t datagram_bytes = 64 * 1024;  // UDP over IPv4 carries 65,507
 constexpr std::int64_t interfaces_age_us = 5'000'000;
 
@@ -157,65 +156,40 @@ void AcceptedSenders::read_interfaces() {
   ::freeifaddrs(all);
 }
 
-struct DatagramSocket::State {
-  State(AcceptedSenders accepted_senders, DatagramCounters& counted)
-      : accepted(std::move(accepted_senders)),
-        counters(counted),
-        reader(counted),
-        bytes(batch * datagram_bytes) {
-    for (std::size_t k = 0; k < batch; ++k) {
-      parts[k] = {bytes.data() + k * datagram_bytes, datagram_bytes};
-      messages[k].msg_hdr.msg_iov = &parts[k];
-      messages[k].msg_hdr.msg_iovlen = 1;
-    }
+DatagramSocket::DatagramSocket(AcceptedSenders accepted, DatagramCounters& counters)
+    : accepted_(std::move(accepted)), counters_(counters), reader_(counters), bytes_(batch * datagram_bytes) {
+  for (std::size_t k = 0; k < batch; ++k) {
+    parts_[k] = {bytes_.data() + k * datagram_bytes, datagram_bytes};
+    messages_[k].msg_hdr.msg_iov = &parts_[k];
+    messages_[k].msg_hdr.msg_iovlen = 1;
   }
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-  ~State() {
-    if (descriptor >= 0) ::close(descriptor);
-  }
-
-  template <class Value>
-  bool set(int level, int option, const Value& value) {
-    return ::setsockopt(descriptor, level, option, &value, sizeof value) == 0;
-  }
-
-  // The kernel reports with each datagram how many it has dropped so far.
-  void count_dropped(const msghdr& header) {
-    for (cmsghdr* item = CMSG_FIRSTHDR(&header); item != nullptr;
-         item = CMSG_NXTHDR(const_cast<msghdr*>(&header), item)) {
-      if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SO_RXQ_OVFL) continue;
-      std::uint32_t now = 0;
-      std::memcpy(&now, CMSG_DATA(item), sizeof now);
-      counters.add(DatagramFault::kernel, now - dropped);  // modulo 2^32, as the kernel counts
-      dropped = now;
-    }
-  }
-
-  AcceptedSenders accepted;
-  DatagramCounters& counters;
-  DatagramReader reader;
-  std::vector<std::uint8_t> bytes;
-  std::array<iovec, batch> parts{};
-  std::array<mmsghdr, batch> messages{};
-  std::array<sockaddr_in, batch> senders{};
-  std::array<std::array<std::uint64_t, 8>, batch> controls{};
-  std::uint32_t dropped = 0;
-  int descriptor = -1;
-};
-
-DatagramSocket::DatagramSocket(std::unique_ptr<State> state) noexcept : state_(std::move(state)) {}
-DatagramSocket::DatagramSocket(DatagramSocket&&) noexcept = default;
-DatagramSocket& DatagramSocket::operator=(DatagramSocket&&) noexcept = default;
-DatagramSocket::~DatagramSocket() = default;
-
-int DatagramSocket::descriptor() const noexcept {
-  return state_->descriptor;
 }
 
-Result<DatagramSocket> DatagramSocket::open(const UdpmUrl& url, const std::string& interface_address,
-                                            AcceptedSenders accepted, DatagramCounters& counters) {
-  auto state = std::make_unique<State>(std::move(accepted), counters);
+DatagramSocket::~DatagramSocket() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+// The kernel reports with each datagram how many it has dropped so far.
+void DatagramSocket::count_dropped(const msghdr& header) {
+  for (cmsghdr* item = CMSG_FIRSTHDR(&header); item != nullptr;
+       item = CMSG_NXTHDR(const_cast<msghdr*>(&header), item)) {
+    if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SO_RXQ_OVFL) continue;
+    std::uint32_t now = 0;
+    std::memcpy(&now, CMSG_DATA(item), sizeof now);
+    counters_.add(DatagramFault::kernel, now - dropped_);  // modulo 2^32, as the kernel counts
+    dropped_ = now;
+  }
+}
+
+Result<std::unique_ptr<DatagramSocket>> DatagramSocket::open(const UdpmUrl& url,
+                                                             const std::string& interface_address,
+                                                             AcceptedSenders accepted,
+                                                             DatagramCounters& counters) {
+  std::unique_ptr<DatagramSocket> made(new DatagramSocket(std::move(accepted), counters));
+  int& descriptor = made->descriptor_;
+  const auto set = [&](int level, int option, const auto& value) {
+    return ::setsockopt(descriptor, level, option, &value, sizeof value) == 0;
+  };
   const auto failed = [](const char* setting, const std::string& what) {
     return fail(Fault::unavailable, setting, what + ": " + std::strerror(errno));
   };
@@ -226,44 +200,43 @@ Result<DatagramSocket> DatagramSocket::open(const UdpmUrl& url, const std::strin
     if (!address) return invalid("lcm.bind_address", "'" + interface_address + "' is no IPv4 address");
     membership.imr_interface.s_addr = htonl(*address);
   }
-  state->descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (state->descriptor < 0) return failed("lcm.url", "cannot open a socket");
+  descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (descriptor < 0) return failed("lcm.url", "cannot open a socket");
   // As liblcm does: several programs of one host listen to one group.
-  if (!state->set(SOL_SOCKET, SO_REUSEADDR, 1)) return failed("lcm.url", "cannot share the port");
-  if (url.receive_buffer_bytes > 0 && !state->set(SOL_SOCKET, SO_RCVBUF, url.receive_buffer_bytes))
+  if (!set(SOL_SOCKET, SO_REUSEADDR, 1)) return failed("lcm.url", "cannot share the port");
+  if (url.receive_buffer_bytes > 0 && !set(SOL_SOCKET, SO_RCVBUF, url.receive_buffer_bytes))
     return failed("lcm.url", "cannot set the receive buffer");
-  if (!state->set(SOL_SOCKET, SO_RXQ_OVFL, 1) || !state->set(IPPROTO_IP, IP_MULTICAST_ALL, 0))
+  if (!set(SOL_SOCKET, SO_RXQ_OVFL, 1) || !set(IPPROTO_IP, IP_MULTICAST_ALL, 0))
     return failed("lcm.url", "cannot prepare the socket");
   sockaddr_in group{};
   group.sin_family = AF_INET;
   group.sin_addr = membership.imr_multiaddr;
   group.sin_port = htons(url.port);
-  if (::bind(state->descriptor, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0)
+  if (::bind(descriptor, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0)
     return failed("lcm.url", "cannot bind to the group");
-  if (!state->set(IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) {
+  if (!set(IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) {
     return failed(interface_address.empty() ? "lcm.url" : "lcm.bind_address",
                   "cannot join the group" +
                       (interface_address.empty()
                            ? " (is there a route to it, as `ip route add 224.0.0.0/4 dev lo` adds?)"
                            : " on " + interface_address));
   }
-  return DatagramSocket(std::move(state));
+  return made;
 }
 
 Result<int> DatagramSocket::receive(int max_datagrams, const Handler& handler) {
-  State& s = *state_;
   int handled = 0;
   while (handled < max_datagrams) {
     for (std::size_t k = 0; k < batch; ++k) {
-      msghdr& header = s.messages[k].msg_hdr;
-      header.msg_name = &s.senders[k];
-      header.msg_namelen = sizeof s.senders[k];
-      header.msg_control = s.controls[k].data();
-      header.msg_controllen = sizeof s.controls[k];
+      msghdr& header = messages_[k].msg_hdr;
+      header.msg_name = &senders_[k];
+      header.msg_namelen = sizeof senders_[k];
+      header.msg_control = controls_[k].data();
+      header.msg_controllen = sizeof controls_[k];
     }
     const auto wanted = static_cast<unsigned>(
         std::min<std::size_t>(batch, static_cast<std::size_t>(max_datagrams - handled)));
-    const int count = ::recvmmsg(s.descriptor, s.messages.data(), wanted, MSG_DONTWAIT, nullptr);
+    const int count = ::recvmmsg(descriptor_, messages_.data(), wanted, MSG_DONTWAIT, nullptr);
     if (count < 0) {
       // Errors of an interface that goes down are temporary.
       for (const int passing :
@@ -272,20 +245,19 @@ Result<int> DatagramSocket::receive(int max_datagrams, const Handler& handler) {
       return fail(Fault::unavailable, "lcm.url", std::string("cannot receive: ") + std::strerror(errno));
     }
     const std::int64_t now_us = monotonic_us(), recv_utime_us = host_utime_us();
-    s.reader.expire(now_us);
+    reader_.expire(now_us);
     for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-      const Sender sender{ntohl(s.senders[k].sin_addr.s_addr), ntohs(s.senders[k].sin_port)};
-      if (!s.accepted.accepts(sender.address, now_us)) {
-        s.counters.received.fetch_add(1, std::memory_order_relaxed);
-        s.counters.add(DatagramFault::foreign_sender);
+      const Sender sender{ntohl(senders_[k].sin_addr.s_addr), ntohs(senders_[k].sin_port)};
+      if (!accepted_.accepts(sender.address, now_us)) {
+        counters_.received.fetch_add(1, std::memory_order_relaxed);
+        counters_.add(DatagramFault::foreign_sender);
         continue;
       }
-      const std::span<const std::uint8_t> datagram(s.bytes.data() + k * datagram_bytes,
-                                                   s.messages[k].msg_len);
-      if (const auto message = s.reader.take(sender, datagram, now_us))
+      const std::span<const std::uint8_t> datagram(bytes_.data() + k * datagram_bytes, messages_[k].msg_len);
+      if (const auto message = reader_.take(sender, datagram, now_us))
         handler(sender, *message, recv_utime_us);
     }
-    if (count > 0) s.count_dropped(s.messages[static_cast<std::size_t>(count) - 1].msg_hdr);
+    if (count > 0) count_dropped(messages_[static_cast<std::size_t>(count) - 1].msg_hdr);
     handled += count;
     if (static_cast<unsigned>(count) < wanted) break;
   }

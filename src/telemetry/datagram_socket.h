@@ -1,5 +1,9 @@
 #pragma once
 
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -53,21 +57,34 @@ class DatagramSocket {
 
   // `interface_address`: IPv4 of the interface to listen on; empty: the one that the system routes the group
   // to. Errors name the setting that is at fault.
-  static Result<DatagramSocket> open(const UdpmUrl& url, const std::string& interface_address,
-                                     AcceptedSenders accepted, DatagramCounters& counters);
-  DatagramSocket(DatagramSocket&&) noexcept;
-  DatagramSocket& operator=(DatagramSocket&&) noexcept;
+  static Result<std::unique_ptr<DatagramSocket>> open(const UdpmUrl& url,
+                                                      const std::string& interface_address,
+                                                      AcceptedSenders accepted, DatagramCounters& counters);
+  DatagramSocket(const DatagramSocket&) = delete;
+  DatagramSocket& operator=(const DatagramSocket&) = delete;
   ~DatagramSocket();
 
-  int descriptor() const noexcept;
+  int descriptor() const noexcept { return descriptor_; }
 
   // Handles the datagrams that wait, `max_datagrams` at most, and returns their number. Does not wait.
   Result<int> receive(int max_datagrams, const Handler& handler);
 
  private:
-  struct State;
-  explicit DatagramSocket(std::unique_ptr<State> state) noexcept;
-  std::unique_ptr<State> state_;
+  static constexpr std::size_t batch = 64;
+
+  DatagramSocket(AcceptedSenders accepted, DatagramCounters& counters);
+  void count_dropped(const msghdr& header);
+
+  AcceptedSenders accepted_;
+  DatagramCounters& counters_;
+  DatagramReader reader_;
+  std::vector<std::uint8_t> bytes_;
+  std::array<iovec, batch> parts_{};
+  std::array<mmsghdr, batch> messages_{};
+  std::array<sockaddr_in, batch> senders_{};
+  std::array<std::array<std::uint64_t, 8>, batch> controls_{};
+  std::uint32_t dropped_ = 0;
+  int descriptor_ = -1;
 };
 
 }  // namespace joulecast::telemetry

@@ -64,7 +64,7 @@ struct LcmLink::State {
   std::string url;
   std::optional<UdpmUrl> udpm;
   std::unique_ptr<lcm_t, LcmDestroyer> lcm;
-  std::optional<DatagramSocket> socket;  // of udpm, once listening
+  std::unique_ptr<DatagramSocket> socket;  // of udpm, once listening
   Handler handler;
   std::exception_ptr thrown;
   int wake_fd = -1;
@@ -101,9 +101,8 @@ Result<void> LcmLink::listen(Handler handler, DatagramCounters& counters, const 
   if (state_->handler) return fail(Fault::conflict, "lcm", "the link is already listening");
   if (state_->udpm) {
     TRY_ASSIGN(AcceptedSenders accepted, AcceptedSenders::parse(options.accept_from));
-    TRY_ASSIGN(auto socket,
+    TRY_ASSIGN(state_->socket,
                DatagramSocket::open(*state_->udpm, options.interface_address, std::move(accepted), counters));
-    state_->socket.emplace(std::move(socket));
   } else {
     for (const Subject subject : {Subject::telemetry, Subject::mission_event, Subject::covariates}) {
       lcm_subscription_t* made =

@@ -92,9 +92,7 @@ double meter_only(const std::vector<Message>& all) {
 double pipeline(const std::vector<Message>& all, const char* what, bool store_samples,
                 const std::string& path) {
   std::filesystem::remove(path);
-  history::SqliteOptions options;
-  options.path = path;
-  auto store = history::open_sqlite_store(options);
+  auto store = history::open_store(path);
   if (!store) std::abort();
   history::Writer writer(**store, {});
   ingest::ModelRegistry models;

@@ -171,9 +171,7 @@ class Daemon {
 
 // Forty robots with models, and finished missions with a million trace rows.
 history::MissionKey fill(const std::string& path, const std::vector<std::string>& robots) {
-  history::SqliteOptions options;
-  options.path = path;
-  const auto store = must(history::open_sqlite_store(options));
+  const auto store = must(history::open_store(path));
   history::Writer writer(*store, {});
   for (const std::string& id : robots) {
     history::AddModel model;

@@ -142,7 +142,7 @@ TEST_F(CheckCommand, NamesDoubledCountsOfTables) {
                     {"battery_current", {{"column", "i"}}}}}};
   const std::string how = file("m.json", mapping.dump()), amr = file("a.json", amr_.dump());
   EXPECT_EQ(check({table, "--mapping", how}), Exit::ok);
-  EXPECT_THAT(printed_, HasSubstr("compared with a robot file only: --robot FILE"));
+  EXPECT_THAT(printed_, HasSubstr("units and signs were not checked: that needs --robot FILE"));
   EXPECT_EQ(check({table, "--mapping", how, "--robot", amr}), Exit::fault);
   EXPECT_THAT(printed_, HasSubstr("wheel_velocity looks 2 times the motion,"));
   // Divided once too often.

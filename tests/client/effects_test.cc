@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "client/virtual_robot/simulate.h"
 #include "tests/client/robots.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::virtual_robot {
 namespace {
@@ -253,22 +253,6 @@ TEST(Effects, InductanceChangesOnlyTransients) {
     EXPECT_GT(gap.added(), 0) << id;
     EXPECT_LT(std::abs(gap.energy), gap.absolute) << id;
   }
-}
-
-TEST(Effects, FindsStrengthForGap) {
-  const SimulationSpec spec = quiet_spec("tug");
-  for (const char* id : {"coulomb_friction", "turning_scrub", "x_heading_load"}) {
-    const auto strength = strength_for_gap(spec, 3, id, 0.06);
-    ASSERT_TRUE(strength) << describe(strength.error());
-    SimulationSpec found = spec;
-    found.imperfections = *make_imperfections({{id, *strength}});
-    // The search stops within 2e-3 of the request.
-    EXPECT_NEAR(power_gap(found, 3).added(), 0.06, 2.1e-3 * 0.06) << id;
-  }
-  const auto none = strength_for_gap(spec, 3, "battery_resistance", 0.06);
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().fault, Fault::infeasible);
-  EXPECT_EQ(strength_for_gap(spec, 3, "gravity", 0.06).error().fault, Fault::invalid);
 }
 
 TEST(Effects, RejectsUnknownIdsAndStrengths) {

@@ -39,7 +39,7 @@ TEST(GapOutput, OmitsUnknownNoiseFloor) {
   d.channels = {{"motor_power", 0.202, d.noise_floor}};
   d.baseline->terms.clear();
   const std::string text = printed(gap::diagnosis_to_json(d));
-  EXPECT_NE(text.find("absolute power 20.2 %, of the motors' power"), std::string::npos) << text;
+  EXPECT_NE(text.find("mean absolute power error 20.2 %, of the motors' power"), std::string::npos) << text;
   EXPECT_EQ(text.find("nan"), std::string::npos) << text;
   EXPECT_EQ(text.find("power by term"), std::string::npos) << text;
 }
@@ -52,25 +52,27 @@ TEST(GapOutput, PrintsSectionsInOrder) {
         "note: 1 message could not be read",
         "checks of the recordings:",
         "It is reversed. It is not used below.",
-        "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
-        "other readings: yaw_rate 5.2 %",
-        "power by term          in the data   robot file    explained  unit",
-        "turning                  1150 ± 12           90         1140  W/(m/s)",
-        "Turning costs 1150 W per m/s; the model has 90.",
-        "verdict: effects (probability 0.93)",
+        "gap: +10.1 % of the measured energy; mean absolute power error 20.2 % (noise floor 3.3 %)",
+        "error of other readings (noise floor): yaw_rate 5.2 %",
+        "verdict: effects found (probability 93\u00a0%)",
         "These data do not distinguish slope from grade.",
-        "coulomb_friction: probability 0.96, 19.5 W; 72 % of the closed gap returns without it",
-        "ratio = 0.41 ± 0.02",
+        "coulomb_friction: probability 96\u00a0%, 19.5 W on average; without it 72 % of the closed gap "
+        "returns",
+        "ratio = 0.410 ± 0.020",
         "to check: bearings",
-        "covariate:cpu_load: probability 0.81",
+        "covariate:cpu_load: probability 81\u00a0%",
         "outside the catalogue: wheel_torque follows time",
-        "held-out error of the power: robot file 20.5 %, explained 6.4 %, regression 11.5 %, noise 3.3 %",
-        "the causes close 68 % of the gap",
-        "motor.friction_torque_nm 1.69 ± 0.03 instead of 1.2",
-        "where:",
-        "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
+        "power error on held-out data: robot file 20.5 %, this diagnosis 6.4 %, linear regression 11.5 %, "
+        "noise floor 3.3 %",
+        "the effects close 68 % of the gap",
+        "power by term          in the data   robot file  this diagnosis  unit",
+        "turning                  1150 ± 12           90            1140  W/(m/s)",
+        "Turning costs 1150 W per m/s; the model has 90.",
+        "motor.friction_torque_nm 1.690 ± 0.030 instead of 1.2",
+        "where the gap arises",
+        "battery_power, phase turning: +61 % of the gap (51 to 71 %) in 17 % of the time",
         "next drive, to distinguish a from b:",
-        "- drive fast (log evidence +7.5)"}) {
+        "- drive fast (expected log evidence 7.5)"}) {
     const std::size_t found = text.find(next, at);
     ASSERT_NE(found, std::string::npos) << next << "\n" << text;
     at = found;
@@ -109,7 +111,7 @@ TEST(GapOutput, PrintsDegreesAfterRadians) {
   d.effects[0].parameters = {{"tilt", "rad", 0.1, 0.01}};
   d.where = {{"battery_power", "heading_rad", "", 0, 1.5707963, 0.3, 0.1, {0.2, 0.4}}};
   EXPECT_THAT(printed(gap::diagnosis_to_json(d)),
-              AllOf(HasSubstr("tilt = 0.1 ± 0.01 rad (5.73 deg)"), HasSubstr("(0 deg to 90 deg)")));
+              AllOf(HasSubstr("tilt = 0.100 ± 0.010 rad (5.73 deg)"), HasSubstr("(0 to 90 deg)")));
 }
 
 // A diagnosis stored by a daemon of an earlier version.
@@ -124,8 +126,8 @@ TEST(GapOutput, ReadsEarlierDiagnosis) {
   old["where"][0].erase("time_share");
   EXPECT_THAT(
       printed(old),
-      AllOf(HasSubstr("coulomb_friction: probability 0.96; 72 % of the closed gap returns without it\n"),
-            HasSubstr("phase turning: +61 % of the gap [51, 71]\n")));
+      AllOf(HasSubstr("coulomb_friction: probability 96\u00a0%; without it 72 % of the closed gap returns\n"),
+            HasSubstr("phase turning: +61 % of the gap (51 to 71 %)\n")));
 }
 
 TEST(GapOutput, RefusalNamesItsOption) {

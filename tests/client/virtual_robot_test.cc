@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
-#include "client/virtual_robot/simulate.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "tests/client/robots.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::virtual_robot {
 namespace {

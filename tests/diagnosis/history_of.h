@@ -5,12 +5,12 @@
 #include <string>
 
 #include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/simulate.h"
 #include "dynamics/drive_model.h"
 #include "history/writer.h"
 #include "signals/mission_event.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::testing {
 

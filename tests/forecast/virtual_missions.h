@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "client/virtual_robot/simulate.h"
 #include "missions.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::forecast {
 

@@ -79,13 +79,13 @@ TEST(VerdictText, ReportsUncertainShrinkage) {
 
 TEST(VerdictText, NamesContradictingEvidence) {
   Diagnosis d = with_effect(Verdict::inconclusive);
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("The probability of coulomb friction is only 0.40")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("The probability of coulomb friction is only 40\u00a0%")));
   d.effects[0].alternatives = {"viscous_friction", "gear_efficiency"};
   d.outside.probability = 0.35;
   EXPECT_THAT(
       said_of(d),
       ElementsAre("These data do not distinguish coulomb friction from viscous friction or gear efficiency.",
-                  HasSubstr("cause outside the catalogue may be present, too (probability 0.35)")));
+                  HasSubstr("cause outside the catalogue may be present, too (probability 35\u00a0%)")));
   d.effects[0].alternatives.clear();
   d.outside.probability = 0;
   d.shrinkage->after = 0.1;
@@ -94,9 +94,7 @@ TEST(VerdictText, NamesContradictingEvidence) {
                                     "the noise floor is 1\u00a0%")));
   d.shrinkage->after = 0.3;
   d.shrinkage->interval = {-0.7, -0.3};
-  EXPECT_THAT(
-      said_of(d),
-      ElementsAre(HasSubstr("makes the gap of held-out data larger: 30\u00a0% instead of 20\u00a0%")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("effect increases the gap: from 20\u00a0% to 30\u00a0%")));
 }
 
 TEST(VerdictText, ReportsReasonsWithoutEffects) {
@@ -130,11 +128,11 @@ TEST(VerdictText, NamesBetterBaseline) {
   d.baseline = baseline(0.1, 0.2, 0.15);
   d.baseline->says = {"Drag."};
   EXPECT_THAT(reasons_for(d, true),
-              ElementsAre(AllOf(HasSubstr("linear regression"), HasSubstr("an error of 10\u00a0%"),
-                                HasSubstr("explanation of 15\u00a0%")),
+              ElementsAre(AllOf(HasSubstr("linear regression"), HasSubstr("acceleration is 10\u00a0%"),
+                                HasSubstr("explanation 15\u00a0%")),
                           "Drag."));
   d.baseline->unchanged_model_held_out = 0.05;
-  EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the robot file has an error of 5\u00a0%")));
+  EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the error is 5\u00a0% with the robot file")));
 }
 
 TEST(VerdictText, ReportsVaryingStrengths) {

@@ -14,9 +14,7 @@ namespace {
 class AuditTest : public ::testing::Test {
  protected:
   AuditTest() {
-    SqliteOptions options;
-    options.path = path_;
-    store_ = need(open_sqlite_store(options));
+    store_ = need(open_store(path_));
     // Few enough for one page, so that no stale copy of an entry is in the file.
     for (int k = 0; k < 12; ++k) append("carol-" + std::to_string(k));
   }

@@ -31,9 +31,7 @@ constexpr std::int64_t samples_a_checkpoint = 10;
 
 // The child: goes on with the open mission, or starts it, until it is killed.
 [[noreturn]] void write_forever(const std::string& path, Tells tells, int pipe) {
-  SqliteOptions options;
-  options.path = path;
-  auto store = need(open_sqlite_store(options));
+  auto store = need(open_store(path));
   const auto open_missions = need(store->recover());
   Writer writer(*store, {});
   Mission m = open_missions.empty() ? new_mission(*store, "amr-1", "m", 0) : open_missions.front();
@@ -99,9 +97,7 @@ std::int64_t stored_samples(const std::string& path) {
     EXPECT_EQ(database.text("PRAGMA integrity_check"), "ok");
     EXPECT_EQ(database.integer("SELECT count(*) FROM pragma_foreign_key_check"), 0);
   }
-  SqliteOptions options;
-  options.path = path;
-  auto store = need(open_sqlite_store(options));
+  auto store = need(open_store(path));
   const auto missions = need(store->recover());
   EXPECT_EQ(missions.size(), 1U);
   const Mission& m = missions.at(0);

@@ -27,11 +27,7 @@ class ForwardingStore : public Store {
   Result<StoreSize> size() const override { return store_->size(); }
 
  protected:
-  static std::unique_ptr<Store> open_at(const std::string& path) {
-    SqliteOptions options;
-    options.path = path;
-    return need(open_sqlite_store(options));
-  }
+  static std::unique_ptr<Store> open_at(const std::string& path) { return need(open_store(path)); }
   virtual void before_read() const {}
 
   std::unique_ptr<Store> store_;

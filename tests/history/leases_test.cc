@@ -32,10 +32,12 @@ class LeasesTest : public ::testing::Test {
 
   std::unique_ptr<Daemon> daemon(const std::string& node, milliseconds lifetime = milliseconds(5000)) {
     auto made = std::make_unique<Daemon>();
-    made->store = need(
-        open_shared_store(url(), made->writer,
-                          [&dropped = made->dropped](const std::string& robot_id, Epoch,
-                                                     std::uint64_t count) { dropped[robot_id] += count; }));
+    made->store = need(open_store(
+        url(),
+        {.shared_writer = made->writer,
+         .on_dropped = [&dropped = made->dropped](const std::string& robot_id, Epoch, std::uint64_t count) {
+           dropped[robot_id] += count;
+         }}));
     made->leases = std::make_unique<Leases>(
         LeaseOptions{url(), "test", node, "http://" + node, "1", made->writer, lifetime});
     need_done(made->leases->join());
@@ -274,15 +276,12 @@ TEST_F(LeasesTest, DaemonsCommitConcurrently) {
 TEST_F(LeasesTest, SharedAndExclusiveUseConflict) {
   {
     const auto a = daemon("a");
-    PostgresOptions alone;
-    alone.url = url();
-    alone.lock_wait = milliseconds(200);
-    const auto refused = open_postgres_store(alone);
+    const auto refused = open_store(url(), {.lock_wait = milliseconds(200)});
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().fault, Fault::conflict);
   }
   const auto alone = need(open_store(url()));
-  const auto refused = open_shared_store(url(), new_writer_name(), {});
+  const auto refused = open_store(url(), {.shared_writer = new_writer_name()});
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, Fault::conflict);
 }

@@ -24,7 +24,7 @@ class PostgresSchemaTest : public ::testing::Test {
 
 // The next version of the tables, of one more column.
 std::vector<Migration> next_version(std::string_view sql) {
-  return {{postgres_schema().version, sql}};
+  return {{postgres_schema().version, std::string(sql)}};
 }
 
 TEST_F(PostgresSchemaTest, NextVersionKeepsTheTables) {
@@ -108,7 +108,7 @@ TEST_F(PostgresSchemaTest, OneOfTwoDaemonsCreates) {
   std::vector<Result<std::unique_ptr<Store>>> stores(2);
   const std::string url = this->url();
   for (auto& store : stores)
-    daemons.emplace_back([&] { store = open_shared_store(url, new_writer_name(), {}); });
+    daemons.emplace_back([&] { store = open_store(url, {.shared_writer = new_writer_name()}); });
   for (std::thread& daemon : daemons) daemon.join();
   for (auto& store : stores) EXPECT_TRUE(store) << describe(store.error());
   EXPECT_EQ(ask("SELECT count(*)::text FROM joulecast_store"), "1");

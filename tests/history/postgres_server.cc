@@ -63,10 +63,7 @@ void stop_postgres() {
 StoreKind store_kind() {
   return {"Postgres",
           [](const TemporaryFolder& folder, std::function<std::int64_t()> clock) {
-            PostgresOptions options;
-            options.url = postgres_url(folder);
-            options.now_utime_us = std::move(clock);
-            return need(open_postgres_store(options));
+            return need(open_store(postgres_url(folder), {.now_utime_us = std::move(clock)}));
           },
           postgres_url};
 }

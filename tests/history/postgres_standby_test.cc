@@ -43,11 +43,9 @@ class PostgresStandbyTest : public ::testing::Test {
   void SetUp() override {
     const std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
     administer(*primary_, "CREATE SCHEMA " + name);
-    PostgresOptions options;
-    options.url = url(*primary_) + "&options=-csearch_path%3D" + name;
-    options.standby.url = url(*standby_) + "&options=-csearch_path%3D" + name;
-    options.standby.max_staleness_s = max_staleness_s;
-    store_ = need(open_postgres_store(options));
+    const std::string schema = "&options=-csearch_path%3D" + name;
+    store_ =
+        need(open_store(url(*primary_) + schema, {.standby = {url(*standby_) + schema, max_staleness_s}}));
   }
 
   static std::string url(const TemporaryFolder& folder) {
@@ -139,12 +137,9 @@ TEST_F(PostgresStandbyTest, MissingStandbyIsSkipped) {
 }
 
 TEST_F(PostgresStandbyTest, IgnoresPrimaryAsStandby) {
-  PostgresOptions options;
   const std::string schema = "&options=-csearch_path%3Dno_standby";
   administer(*primary_, "CREATE SCHEMA no_standby");
-  options.url = url(*primary_) + schema;
-  options.standby.url = url(*primary_) + schema;
-  const auto store = need(open_postgres_store(options));
+  const auto store = need(open_store(url(*primary_) + schema, {.standby = {url(*primary_) + schema}}));
   for (int tries = 0; tries < 200 && store->standby()->why_not.empty(); ++tries)
     std::this_thread::sleep_for(25ms);
   EXPECT_NE(store->standby()->why_not.find("no standby"), std::string::npos) << store->standby()->why_not;

@@ -27,10 +27,7 @@ using std::chrono::milliseconds;
 class PostgresStoreTest : public ::testing::Test {
  protected:
   Result<std::unique_ptr<Store>> open() const {
-    PostgresOptions options;
-    options.url = postgres_url(folder_);
-    options.lock_wait = milliseconds(200);
-    return open_postgres_store(options);
+    return open_store(postgres_url(folder_), {.lock_wait = milliseconds(200)});
   }
   std::string administer(const std::string& sql) const { return as_administrator(folder_, sql); }
   void end_connections() const {
@@ -270,12 +267,10 @@ class Relay {
 class PostgresCommitTest : public PostgresStoreTest {
  protected:
   Result<std::unique_ptr<Store>> open_through(const Relay& relay) const {
-    PostgresOptions options;
     const std::string url = postgres_url(folder_);
     const std::size_t host = url.find("host=") + 5;
-    options.url =
-        url.substr(0, host) + "127.0.0.1&port=" + std::to_string(relay.port()) + url.substr(url.find('&'));
-    return open_postgres_store(options);
+    return open_store(url.substr(0, host) + "127.0.0.1&port=" + std::to_string(relay.port()) +
+                      url.substr(url.find('&')));
   }
   Relay relay_{postgres_socket()};
   const std::vector<Command> batch_ = {an_event(), ActivateModel{"absent", 1}, an_event()};

@@ -12,7 +12,7 @@
 namespace joulecast::history {
 namespace {
 
-const Migration steps[] = {
+const std::vector<Migration> steps{
     {0, "CREATE TABLE colour (name TEXT NOT NULL) STRICT; INSERT INTO colour VALUES ('red');"},
     {1, "ALTER TABLE colour ADD COLUMN hue_deg REAL; UPDATE colour SET hue_deg = 0;"},
     {2, "UPDATE colour SET name = upper(name);"},
@@ -28,7 +28,7 @@ class SchemaTest : public ::testing::Test {
 
 // A store's file at an older version, as the program of that time left it.
 void make_old(Database& database, std::int64_t version) {
-  for (std::int64_t k = 0; k < version; ++k) database.execute(std::string(steps[k].sql));
+  for (std::int64_t k = 0; k < version; ++k) database.execute(steps[k].sql);
   database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
   database.execute("PRAGMA user_version = " + std::to_string(version));
 }
@@ -55,7 +55,8 @@ TEST_F(SchemaTest, MigratesFromEveryOlderVersion) {
 }
 
 TEST_F(SchemaTest, AFailingMigrationChangesNothing) {
-  const Migration broken[] = {steps[0], steps[1], {2, "DELETE FROM colour; UPDATE nowhere SET x = 1;"}};
+  const std::vector<Migration> broken{
+      steps[0], steps[1], {2, "DELETE FROM colour; UPDATE nowhere SET x = 1;"}};
   SqliteDatabase database = open();
   make_old(database, 1);
   EXPECT_THROW((void)bring_to_schema(database, Schema{3, third.sql, broken}), SqlError);
@@ -80,7 +81,7 @@ TEST_F(SchemaTest, RejectsNewerFilesNamingVersions) {
 TEST_F(SchemaTest, RejectsFilesBeforeTheList) {
   SqliteDatabase database = open();
   make_old(database, 1);
-  const auto brought = bring_to_schema(database, Schema{3, third.sql, std::span(steps).subspan(2)});
+  const auto brought = bring_to_schema(database, Schema{3, third.sql, {steps[2]}});
   ASSERT_FALSE(brought);
   EXPECT_EQ(brought.error().fault, Fault::conflict);
   EXPECT_EQ(brought.error().message, "store of a development version: copy it with the build that wrote it");
@@ -96,16 +97,9 @@ TEST_F(SchemaTest, RejectsForeignDatabases) {
   EXPECT_EQ(database.integer("PRAGMA application_id"), 0);
 }
 
-TEST_F(SchemaTest, MigrationsReachTheVersion) {
-  std::int64_t next =
-      store_schema().migrations.empty() ? store_schema().version : store_schema().migrations.front().from;
-  for (const Migration& migration : store_schema().migrations) EXPECT_EQ(migration.from, next++);
-  EXPECT_EQ(next, store_schema().version);
-}
-
 // The next version of the store, of one more column.
 TEST_F(SchemaTest, NextVersionKeepsTheStore) {
-  const Migration next[] = {{store_schema().version, "ALTER TABLE robot ADD COLUMN colour TEXT;"}};
+  const std::vector<Migration> next{{store_schema().version, "ALTER TABLE robot ADD COLUMN colour TEXT;"}};
   SqliteDatabase database = open();
   ASSERT_TRUE(bring_to_schema(database, store_schema()));
   database.execute(

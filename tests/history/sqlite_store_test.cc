@@ -20,23 +20,17 @@ namespace {
 
 class SqliteStoreTest : public ::testing::Test {
  protected:
-  Result<std::unique_ptr<Store>> open() const {
-    SqliteOptions options;
-    options.path = path_;
-    options.busy_timeout_ms = 50;
-    return open_sqlite_store(options);
-  }
+  Result<std::unique_ptr<Store>> open() const { return open_store(path_, {.busy_timeout_ms = 50}); }
 
   TemporaryFolder folder_;
   const std::string path_ = folder_.file("store.db");
 };
 
 TEST_F(SqliteStoreTest, SynchronizesEachCommitByDefault) {
-  SqliteOptions options;
-  options.path = path_;
-  EXPECT_EQ(need(open_sqlite_tables(options))->integer("PRAGMA synchronous"), 2);
-  options.durability = Durability::process_end;
-  EXPECT_EQ(need(open_sqlite_tables(options))->integer("PRAGMA synchronous"), 1);
+  EXPECT_EQ(need(open_sqlite_tables(path_, {}))->integer("PRAGMA synchronous"), 2);
+  EXPECT_EQ(
+      need(open_sqlite_tables(path_, {.durability = Durability::process_end}))->integer("PRAGMA synchronous"),
+      1);
 }
 
 TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
@@ -73,9 +67,7 @@ TEST_F(SqliteStoreTest, RejectsOtherFiles) {
 }
 
 TEST_F(SqliteStoreTest, ReportsMissingFolder) {
-  SqliteOptions options;
-  options.path = folder_.file("absent/store.db");
-  const auto store = open_sqlite_store(options);
+  const auto store = open_store(folder_.file("absent/store.db"));
   ASSERT_FALSE(store);
   EXPECT_EQ(store.error().fault, Fault::unavailable);
 }

@@ -20,11 +20,7 @@ class StoreCare : public ::testing::Test {
  protected:
   StoreCare() : path_(folder_.file("store.db")) { open(); }
 
-  void open() {
-    SqliteOptions options;
-    options.path = path_;
-    store_ = need(open_sqlite_store(options));
-  }
+  void open() { store_ = need(open_store(path_)); }
 
   // Adds this number of missions of a robot with a model, of 1,000 samples each.
   void fill(int missions, const std::string& robot_id = "amr-1") {

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <string>
 
-#include "client/virtual_robot/simulate.h"
 #include "robot/robot_file.h"
 #include "tests/client/robots.h"
 #include "tests/ingest/harness.h"

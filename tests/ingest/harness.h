@@ -45,9 +45,7 @@ class PipelineHarness {
   void restart() {
     pipeline.reset();
     store.reset();
-    history::SqliteOptions options;
-    options.path = folder_.file("history.db");
-    auto opened = history::open_sqlite_store(options);
+    auto opened = history::open_store(folder_.file("history.db"));
     if (!opened) throw std::runtime_error(describe(opened.error()));
     store = std::move(*opened);
     pipeline = std::make_unique<ingest::Pipeline>(

@@ -104,9 +104,7 @@ struct Daemon {
 class TakeoverTest : public ::testing::Test {
  protected:
   std::unique_ptr<history::Store> store(const std::string& name) {
-    history::SqliteOptions options;
-    options.path = folder_.file(name);
-    auto opened = history::open_sqlite_store(options);
+    auto opened = history::open_store(folder_.file(name));
     if (!opened) throw std::runtime_error(describe(opened.error()));
     history::Command model = history::AddModel{"nomad", 1, history::ModelOrigin::file, "", "{}", {}};
     if (!(*opened)->apply({&model, 1})) throw std::runtime_error("the robot");

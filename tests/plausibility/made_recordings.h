@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/simulate.h"
 #include "robot/robot_file.h"
 #include "signals/mission_event.h"
 #include "telemetry/recording_set.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::made {
 

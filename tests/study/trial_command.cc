@@ -8,13 +8,13 @@
 
 #include "base/nearest_word.h"
 #include "client/commands/option.h"
-#include "client/virtual_robot/imperfections.h"
 #include "tests/study/cases_command.h"
 #include "tests/study/motion_command.h"
 #include "tests/study/outcome_lines.h"
 #include "tests/study/study_commands.h"
 #include "tests/study/trial/run.h"
 #include "tests/study/trial/score_text.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::client {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/simulate.h"
 #include "robot/robot_file.h"
 #include "tests/study/trial/robot_draw.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::trial {
 namespace {

@@ -624,7 +624,7 @@ await check('missions are filtered by ratio and sorted by keyboard', async () =>
       some.map((m) => m.mission_id).join(),
   );
   await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
-  await page.getByRole('button', { name: 'Leave out worn-01' }).click();
+  await page.getByRole('button', { name: 'Remove worn-01' }).click();
   await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
 });
 
@@ -733,7 +733,7 @@ await check('the floor shows energy and gap by square', async () => {
   expect(Math.abs(map.distance_m / distance - 1) < 0.03, `${map.distance_m} m, ${distance} m of missions`);
   const figures = await page.locator('.readouts').first().textContent();
   expect(figures.includes((map.energy_j / map.distance_m / 3.6).toFixed(1)), figures);
-  const canvas = page.getByRole('application', { name: /^Map of the floor: energy over distance/ });
+  const canvas = page.getByRole('application', { name: /^Map of the floor: consumption/ });
   await canvas.focus();
   await page.keyboard.press('ArrowRight');
   const strip = page.locator('.floor-strip');
@@ -749,7 +749,7 @@ await check('the floor shows energy and gap by square', async () => {
   await page.getByRole('application', { name: /^Map of the floor: departure/ }).waitFor();
   await page.getByText('neutral at').waitFor();
   expect(page.url().includes('show=gap'), page.url());
-  await page.getByText(/squares of greatest excess energy, as a table/).waitFor();
+  await page.getByText(/squares with the greatest excess energy/).waitFor();
   const excess = (c) => (c.departure === null ? -Infinity : c.measured_j * (1 - 1 / (1 + c.departure)));
   const most = map.cells.reduce((best, c) => (excess(c) > excess(best) ? c : best));
   const cells = await page.locator('.squares tbody tr').first().locator('td').allTextContents();
@@ -1138,7 +1138,11 @@ await check('impossible time savings are not offered', async () => {
   await page.keyboard.press('Enter');
   await response;
   await page.locator('.facts').getByText('no shorter time is possible: the robot is at its limits').waitFor();
-  equal(await page.getByText(/(second less|less time) costs 0 (J|Wh)/).count(), 0, 'offers for nothing');
+  equal(
+    await page.getByText(/(second less|less time) costs at least 0 (J|Wh)/).count(),
+    0,
+    'offers for nothing',
+  );
   response = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByLabel('Deadline').fill('');
   await page.getByRole('button', { name: 'Compute', exact: true }).click();
@@ -1154,7 +1158,7 @@ await check('a deadline of the front is met; charge limits it', async () => {
   await page.keyboard.press('Home');
   await page.keyboard.press('ArrowRight');
   const again = page.waitForResponse((r) => r.url().endsWith('/profile'));
-  await page.getByRole('button', { name: 'Take as deadline' }).click();
+  await page.getByRole('button', { name: 'Use as deadline' }).click();
   const answer = await (await again).json();
   const deadline = Number(await page.getByLabel('Deadline').inputValue());
   expect(answer.duration_s <= deadline * (1 + 1e-6), `${answer.duration_s} s after ${deadline} s`);
@@ -1762,7 +1766,7 @@ await check('a robot is added, reviewed, edited and removed', async () => {
   await page.getByRole('link', { name: 'Add a robot' }).click();
   await page.getByText(/values are missing/).waitFor();
   await page
-    .getByLabel('Robot file from the disk')
+    .getByLabel('Load a robot file')
     .setInputFiles(asFile('added.json', 'application/json', JSON.stringify(file)));
   const capacity = page.getByLabel('Capacity', { exact: true });
   await until('the form', async () => (await capacity.inputValue()) === String(file.battery.capacity_ah));

@@ -68,7 +68,7 @@ async function foreign(page, data) {
     const found = [];
     while (walker.nextNode()) {
       const { parentElement, data: text } = walker.currentNode;
-      if (!parentElement.closest('[data-title="Began"], [data-title="Lasted"]')) found.push(text);
+      if (!parentElement.closest('[data-title="Started"], [data-title="Duration"]')) found.push(text);
     }
     return found;
   });
@@ -118,7 +118,8 @@ try {
   for (const text of [...result.reasons, ...result.checks.map((c) => c.says), ...data.origin.sources])
     assert.ok(main.includes(text), text);
   for (const [name, c] of Object.entries(result.baseline.terms))
-    assert.ok(main.includes(name) && main.includes(c.unit), name);
+    for (const text of [name, c.unit])
+      assert.ok(main.includes(text.replace(/\^([23])/g, (_, power) => '²³'[power - 2])), text);
   assert.equal(await page.locator('.uplot').count(), result.figures.maps.length + 1, 'charts');
   assert.equal(await page.locator('canvas.floor').count(), 1, 'the floor');
   assert.equal(await page.locator('.legend .colours').count(), 1, 'its scale');

@@ -185,10 +185,3 @@ export function Chart({ make, data, height = 220, label, changes = [], onReady }
 export function withAlpha(colour, share) {
   return `color-mix(in srgb, ${colour} ${share * 100}%, transparent)`;
 }
-
-export const cursorOf = (group) => ({
-  sync: { key: group },
-  points: { size: 7, width: 1.5 },
-  drag: { x: true, y: false, dist: 6 },
-  focus: { prox: -1 },
-});

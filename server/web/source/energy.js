@@ -1,6 +1,6 @@
 // Energies in the chosen unit, watt hours or joules. Values are in joules.
 import { keptChoice } from './choice.js';
-import { digits, fixed, known } from './format.js';
+import { digits, fixed, known, none } from './format.js';
 
 const units = {
   Wh: [
@@ -14,7 +14,6 @@ const units = {
   ],
 };
 const choice = keptChoice('energy_unit', ['Wh', 'J'], () => 'Wh');
-const none = { n: '–', u: '' };
 
 export const energyUnit = choice.get;
 export const useEnergyUnit = choice.use;

@@ -3,6 +3,7 @@
 const thin = '\u2009';
 const dash = '–';
 const minus = '−';
+export const none = { n: dash, u: '' }; // a quantity that is not known
 
 function group(text) {
   const [whole, part] = text.split('.');
@@ -37,14 +38,14 @@ export function signed(text) {
 // Quantities are {n, u}: the number and the unit, prefixed so that the number stays short.
 
 export function power(watt) {
-  if (!known(watt)) return { n: dash, u: '' };
+  if (!known(watt)) return none;
   const size = Math.abs(watt);
   if (size >= 9995) return { n: digits(watt / 1e3), u: 'kW' };
   return { n: fixed(watt, size < 100 ? 1 : 0), u: 'W' };
 }
 
 export function length(metre) {
-  if (!known(metre)) return { n: dash, u: '' };
+  if (!known(metre)) return none;
   const size = Math.abs(metre);
   if (size >= 9995) return { n: digits(metre / 1e3), u: 'km' };
   return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' }; // odometry is not accurate to a millimetre
@@ -53,7 +54,7 @@ export function length(metre) {
 // For columns of distances of the size of kilometres; shorter ones in whole metres.
 export function kilometres(metre) {
   if (known(metre) && Math.abs(metre) < 999.5) return { n: fixed(metre), u: 'm' };
-  return known(metre) ? { n: fixed(metre / 1000, metre < 99_500 ? 1 : 0), u: 'km' } : { n: dash, u: '' };
+  return known(metre) ? { n: fixed(metre / 1000, metre < 99_500 ? 1 : 0), u: 'km' } : none;
 }
 
 // A band of lengths in the unit of its far end: 2.4–35 km, 0–920 m.
@@ -75,21 +76,25 @@ export function range(low, high) {
   return `${fixed(low, places)} to ${fixed(high, places)}`;
 }
 
+const placesOf = (deviation) => Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
+
 // "0.54 ± 0.04": two significant digits of the deviation, and the same decimals of the value.
 export function withDeviation(value, deviation) {
   if (!known(deviation) || deviation <= 0) return digits(value);
-  const places = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
+  const places = placesOf(deviation);
   return `${fixed(value, places)} ± ${fixed(deviation, places)}`;
 }
 
+// A value with the decimals of one with this deviation.
+export const likeDeviation = (value, deviation) =>
+  known(deviation) && deviation > 0 ? fixed(value, placesOf(deviation)) : digits(value);
+
 export function percent(share, places = 0) {
-  return known(share) ? { n: fixed(share * 100, places), u: '%' } : { n: dash, u: '' };
+  return known(share) ? { n: fixed(share * 100, places), u: '%' } : none;
 }
 
 export function unit(value, u, places) {
-  return known(value)
-    ? { n: places === undefined ? digits(value) : fixed(value, places), u }
-    : { n: dash, u: '' };
+  return known(value) ? { n: places === undefined ? digits(value) : fixed(value, places), u } : none;
 }
 
 export function text(quantity) {

@@ -47,24 +47,19 @@ export function Health({ state, reasons = [] }) {
   const noteOf = (r) => (state.fault_notes?.[r] ? `: ${state.fault_notes[r]}` : '');
   const listed = faults.map(([r, n]) => `${format.fixed(n)} ${format.words(r)}${noteOf(r)}`).join(', ');
   const short = shortly(state, reasons);
-  const whole = reasons.map((r) => `${r.message} ${r.action}`).join('\n');
+  const title = short
+    ? reasons.map((r) => `${r.message} ${r.action}`).join('\n')
+    : 'Rejected, repaired or missing samples since the service started';
+  const calm = !short || reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged;
   return (
     <>
       <span class="telemetry">
         <span class={`lamp ${level}`} aria-hidden="true" />
         {text}
       </span>
-      {listed !== '' && short === '' && (
-        <span class="below" title={`Rejected or repaired samples: ${listed}`}>
-          {listed}
-        </span>
-      )}
-      {short !== '' && (
-        <span
-          class={reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged ? 'below' : 'below fault'}
-          title={whole}
-        >
-          {short}
+      {(short || listed) && (
+        <span class={calm ? 'below' : 'below fault'} title={title}>
+          {short || `samples: ${listed}`}
         </span>
       )}
     </>
@@ -92,7 +87,7 @@ export function Reasons({ of, more }) {
 export function chargeNote({ charging, charge, state_of_charge_sd: sd }) {
   const leftS = charge?.time_to_charged_s;
   const left = format.known(leftS) ? `, ${format.about(leftS)}` : '';
-  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger, charging has ended' };
+  if (charging?.phase === 'full') return { text: 'charged', what: 'At its charger; charging has ended' };
   if (charging) return { text: `charging${left}`, what: `At its charger${left}` };
   return {
     text: format.known(sd) ? `± ${format.share(sd)}` : '',
@@ -124,8 +119,8 @@ export function Charge({ state }) {
 export function between(band, as) {
   if (!format.known(band?.p05) || !format.known(band.p95)) return '';
   return (
-    <span title="90 % of the forecast lies between">
-      <span class="hidden">90 % between </span>
+    <span title="90 % interval of the forecast">
+      <span class="hidden">90 % interval </span>
       {as(band.p05, band.p95)}
     </span>
   );

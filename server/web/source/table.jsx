@@ -3,21 +3,16 @@ import { Panel, shown } from './widgets.jsx';
 
 export const names = new Intl.Collator('en', { numeric: true });
 
-function compare(a, b) {
-  const missing = (a === null || a === undefined) - (b === null || b === undefined);
-  if (missing !== 0 || a === null || a === undefined) return missing;
-  return typeof a === 'string' ? names.compare(a, b) : a - b;
-}
+const absent = (v) => v === null || v === undefined;
+const compare = (a, b) => (typeof a === 'string' ? names.compare(a, b) : a - b);
 
 // A copy of `rows` in the order of the column `sort.key`; rows without a value come last in both directions.
 export function sorted(rows, columns, sort) {
   const value = columns.find((c) => c.key === sort?.key)?.sort;
   if (value === undefined) return rows;
-  const direction = sort.down ? -1 : 1;
-  const absent = (v) => v === null || v === undefined;
   return [...rows].sort((one, other) => {
     const [a, b] = [value(one), value(other)];
-    return absent(a) || absent(b) ? compare(a, b) : direction * compare(a, b);
+    return absent(a) || absent(b) ? absent(a) - absent(b) : (sort.down ? -1 : 1) * compare(a, b);
   });
 }
 
@@ -67,8 +62,7 @@ export function SortChoice({ columns, sort, onSort }) {
     <span class="sort-choice">
       <label>
         <span>Sort by</span>
-        <select value={sort?.key ?? ''} onChange={(event) => onSort(event.currentTarget.value)}>
-          {sort ? null : <option value="">as listed</option>}
+        <select value={sort.key} onChange={(event) => onSort(event.currentTarget.value)}>
           {sortable.map((c) => (
             <option key={c.key} value={c.key}>
               {c.title}
@@ -76,11 +70,9 @@ export function SortChoice({ columns, sort, onSort }) {
           ))}
         </select>
       </label>
-      {sort && (
-        <button type="button" onClick={() => onSort(sort.key)}>
-          {sort.down ? 'Descending' : 'Ascending'}
-        </button>
-      )}
+      <button type="button" onClick={() => onSort(sort.key)}>
+        {sort.down ? 'Descending' : 'Ascending'}
+      </button>
     </span>
   );
 }

@@ -115,7 +115,7 @@ class Diagnoser {
     d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
     // Without power another drive with the same channels is of no use.
     if (!motion_known_ || d_.power != PowerSource::none) d_.next_drive = first_drives(robot_);
-    d_.refusal = "nothing was found that a robot file could take";
+    d_.refusal = "no change of the robot file was found";
     d_.reasons.push_back(missing_data(d_, motion_known_));
     return std::move(d_);
   }

@@ -122,10 +122,11 @@ class Explainer {
   }
 
   void state_useless_function() {
-    a_.reasons.push_back(
-        fmt::format("on held-out data the function of {} has an error of {:.1f} % of power, effects {:.1f} %",
-                    fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
-                    100 * a_.held_out.function_effects));
+    a_.reasons.push_back(fmt::format(
+        "a dependence on {} is not named: on held-out data its error is {:.1f} % of the power, that "
+        "of the effects {:.1f} %",
+        fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
+        100 * a_.held_out.function_effects));
   }
 
   // The posterior given that no function is present.
@@ -172,10 +173,15 @@ class Explainer {
     e.power_share = own.norm() * fit_.equations.share[ix(hypothesis.columns[0])];
     e.parameters = parameters_of(hypothesis, own, fit_.strengths[found.model].sd[ix(found.member)]);
     if (e.group >= named && (e.share < least_gap_share || e.share > most_gap_share))
-      withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on held-out data", e.id,
-                              100 * e.share));
+      withhold(
+          e,
+          fmt::format(
+              "the effect {} is not named: its share of the explained gap on held-out data is {:.1f}\u00a0%; "
+              "a named effect has {:.0f} to {:.0f}\u00a0%",
+              e.id, 100 * e.share, 100 * least_gap_share, 100 * most_gap_share));
     e.at_bound = own.size() == 1 && at_bound(hypothesis, own[0]);
-    if (e.group >= named && e.at_bound) withhold(e, e.id + " is at its bound");
+    if (e.group >= named && e.at_bound)
+      withhold(e, fmt::format("the effect {} is not named: its estimate is at its bound", e.id));
     a_.effects.push_back(std::move(e));
   }
 
@@ -356,15 +362,16 @@ class Explainer {
       v = Verdict::inconclusive;
       a_.reasons.push_back(
           std::isfinite(a_.detectable)
-              ? fmt::format("these data show gaps from {:.1f} % of power on", 100 * a_.detectable)
-              : "many effects of any size do not show in these data");
+              ? fmt::format("gaps below {:.1f} % of the power are not detectable in these data",
+                            100 * a_.detectable)
+              : "many effects are not detectable in these data, whatever their size");
     }
     if (v == Verdict::none && gap_is_left()) {
       v = Verdict::inconclusive;
-      a_.reasons.push_back(
-          fmt::format("no cause was found, but on held-out data the calibrated file has an error of {:.1f} % "
-                      "of power, the file {:.1f} %, and {:.1f} % repeats",
-                      100 * h.explanation, 100 * h.file, 100 * a_.repeats_file));
+      a_.reasons.push_back(fmt::format(
+          "no cause was found, but the gap is not noise alone: on held-out data the error is {:.1f} % "
+          "of the power with the robot file and {:.1f} % with a calibrated file, and {:.1f} % repeats",
+          100 * h.file, 100 * h.explanation, 100 * a_.repeats_file));
     }
     a_.verdict = v;
     if (v != Verdict::none) a_.probability = v == Verdict::outside ? a_.outside.probability : surest();
@@ -420,8 +427,8 @@ class Explainer {
   bool more_repeats(double left) {
     if (!(left > std::max(repeats_left * a_.repeats_file, detectable))) return false;
     a_.reasons.push_back(
-        fmt::format("{:.1f} % of power that repeats remains of {:.1f} %: a larger cause is left", 100 * left,
-                    100 * a_.repeats_file));
+        fmt::format("of a repeating error of {:.1f} % of the power {:.1f} % remain: a larger cause is left",
+                    100 * a_.repeats_file, 100 * left));
     cap_effects();
     return true;
   }
@@ -430,9 +437,10 @@ class Explainer {
     const HeldOut& h = a_.held_out;
     if (!h.known) return true;
     if (h.explanation > h.file + clear_gain) {
-      a_.reasons.push_back(
-          fmt::format("on held-out data the explanation has an error of {:.1f} % of power, the file {:.1f} %",
-                      100 * h.explanation, 100 * h.file));
+      a_.reasons.push_back(fmt::format(
+          "on held-out data the error is {:.1f} % of the power with the robot file and {:.1f} % with the "
+          "effects found",
+          100 * h.file, 100 * h.explanation));
       cap_effects();
       return false;
     }

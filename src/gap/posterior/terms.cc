@@ -244,7 +244,7 @@ TermColumns term_columns(const Data& d) {
   add("|v|", "W per m/s", [&](const Window& w) { return std::fabs(speed(w)); });
   add("v^2", "W per (m/s)^2", [&](const Window& w) { return std::pow(speed(w), 2); });
   add("v^3", "W per (m/s)^3", [&](const Window& w) { return std::pow(std::fabs(speed(w)), 3); });
-  add("turning", "W per m/s of half the difference of the sides",
+  add("turning", "W per m/s of half the wheel-speed difference",
       [&](const Window& w) { return radius / 2 * std::fabs(w.speed_rad_s[0] - w.speed_rad_s[1]); });
   add("v a", "W per m^2/s^3 (kg)", [&](const Window& w) {
     return speed(w) * radius / 2 * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);

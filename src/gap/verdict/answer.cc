@@ -28,7 +28,7 @@ bool shown_elsewhere(const Diagnosis& d) {
 
 std::string refusal_of(const Explained& answer, bool other_channels, const Diagnosis& d) {
   if (d.adoptable.empty() || (d.effects.empty() && d.verdict == Verdict::inconclusive))
-    return "nothing was found that a robot file could take";
+    return "no change of the robot file was found";
   if (d.verdict == Verdict::outside)
     return fmt::format("a cause outside the catalogue has a probability of {}",
                        probability_text(d.outside.probability));
@@ -37,8 +37,9 @@ std::string refusal_of(const Explained& answer, bool other_channels, const Diagn
     return fmt::format("{} = {} is at its bound", bound->id, brief(bound->parameters.front().value));
   const HeldOut& h = answer.held_out;
   if (h.known && !answer.adopts && !(other_channels && shown_elsewhere(d)))
-    return fmt::format("the held-out error of the model falls by {} of power, not by more than its scatter",
-                       percent(h.file - h.explanation));
+    return fmt::format(
+        "the effects reduce the held-out error by {} of the power, which is within its scatter",
+        percent(h.file - h.explanation));
   if (!h.known && d.verdict != Verdict::effects)
     return fmt::format("the verdict has a probability of {}, and no power was held out",
                        probability_text(d.verdict_probability));

@@ -187,7 +187,7 @@ std::vector<NextDrive> drives_for(const Outside& outside) {
   });
   const auto* found = std::ranges::find(advice, outside.follows, &Advice::variable);
   if (found == advice.end()) return {};
-  return {{std::string(found->manoeuvre), "what follows the " + std::string(found->variable) + " from chance",
+  return {{std::string(found->manoeuvre), "a dependence on " + std::string(found->variable) + " from chance",
            missing}};
 }
 

@@ -55,7 +55,7 @@ Offer offer_derived(const Json& diagnosis) {
   }
   const std::string verdict = diagnosis.at("verdict").get<std::string>();
   if (offer.effects.empty()) {
-    offer.refusal = "nothing was found that a robot file could take";
+    offer.refusal = "no change of the robot file was found";
   } else if (verdict != name_of(Verdict::effects)) {
     offer.refusal = "the verdict is " + verdict;
   } else if (alternatives) {

@@ -37,8 +37,8 @@ std::string channel_words(std::string_view channel) {
 
 std::string follows_words(std::string_view variable) {
   if (variable == "wheel_angle")
-    return "repeats with the turning of a wheel: look for a wheel out of round, a bent axle, a damaged "
-           "tooth or a motor that cogs";
+    return "repeats with the turning of a wheel: look for an out-of-round wheel, a bent axle, a damaged "
+           "tooth or a cogging motor";
   if (variable == "time") return "changes with the time since the mission began";
   if (variable == "recent_motion")
     return "rises or falls with the recent motion of the robot, as with parts that warm up in use";
@@ -65,8 +65,8 @@ class Reasons {
     }
     if (d_.verdict == Verdict::none) return said_;
     if (d_.verdict == Verdict::not_this_robot)
-      say("the robot file has an error of {} of the power: it belongs to another robot, or another state of "
-          "it{}",
+      say("the robot file has an error of {} of the power: it belongs to another robot, or to another "
+          "state of this one{}",
           percent(d_.power_absolute_relative),
           d_.corrections.empty() ? "" : "; values that fit are proposed below");
     if (!d_.outside.channel.empty()) said_.push_back(outside_words(d_.outside));
@@ -87,8 +87,8 @@ class Reasons {
             "predicts it",
             percent(d_.power_absolute_relative));
       else
-        say("an effect of less than {} of the power is not detectable in these recordings, so that the "
-            "absence of a cause proves little",
+        say("an effect of less than {} of the power is not detectable in these recordings: that none was "
+            "found proves little",
             percent(d_.detectable_share));
     }
     if (said_.empty() && !d_.effects.empty()) {
@@ -109,8 +109,8 @@ class Reasons {
     const Shrinkage& s = *d_.shrinkage;
     const bool one = d_.effects.size() == 1;
     if (s.interval[1] < 0)
-      say("the {} the gap of held-out data larger: {} instead of {}", one ? "effect makes" : "effects make",
-          percent(s.after), percent(s.before));
+      say("on held-out data the {} the gap: from {} to {}", one ? "effect increases" : "effects increase",
+          percent(s.before), percent(s.after));
     else if (s.interval[0] < 0)
       say("the benefit for held-out data is uncertain: the gap shrinks by {} to {}", percent(s.interval[0]),
           percent(s.interval[1]));
@@ -139,12 +139,13 @@ class Reasons {
     if (!d_.baseline) return;
     const Baseline& b = *d_.baseline;
     if (b.unchanged_model_held_out < b.held_out) {
-      say("on held-out data the robot file has an error of {}, and of {} with the effects found",
+      say("on held-out data the error is {} with the robot file and {} with the effects found",
           percent(b.unchanged_model_held_out), percent(b.explanation_held_out));
       return;
     }
-    say("on held-out data a linear regression of power on speed, turning and acceleration has an error of "
-        "{}, this explanation of {}",
+    say("on held-out data the error of a linear regression of power on speed, turning and acceleration is "
+        "{}, "
+        "that of this explanation {}",
         percent(b.held_out), percent(b.explanation_held_out));
     said_.insert(said_.end(), b.says.begin(), b.says.end());
   }
@@ -171,10 +172,11 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
                                 with_deviation(p.value, p.deviation, p.unit),
                                 probability_text(e.probability)));
   }
-  return sentence(fmt::format(
-      "this is the answer from mission {} on, after the step; that of the {} missions before it is {}{}{}",
-      first_mission, earlier.missions, words_of(name_of(earlier.verdict)), found.empty() ? "" : ": ",
-      enumerate(found)));
+  return sentence(
+      fmt::format("this result is for the missions from {} on, after the step; that of the {} missions "
+                  "before it is {}{}{}",
+                  first_mission, earlier.missions, verdict_words(name_of(earlier.verdict)),
+                  found.empty() ? "" : ": ", enumerate(found)));
 }
 
 std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {

@@ -44,11 +44,21 @@ std::string words_of(std::string_view id) {
   return words;
 }
 
+int places_of(double deviation) {
+  return std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 6);
+}
+
+std::string verdict_words(std::string_view verdict) {
+  if (verdict == "none") return "no gap";
+  if (verdict == "effects") return "effects found";
+  if (verdict == "outside") return "outside the catalogue";
+  return words_of(verdict);
+}
+
 std::string with_deviation(double value, double deviation, std::string_view unit) {
   std::string text;
   if (std::isfinite(deviation) && deviation > 0) {
-    // Decimal places that leave the deviation two significant digits.
-    const int places = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 6);
+    const int places = places_of(deviation);
     text = fmt::format("{:.{}f} ± {:.{}f}", value, places, deviation, places);
     if (text.front() == '-') text.replace(0, 1, "−");
   } else {
@@ -64,10 +74,9 @@ std::string percent(double fraction, int digits) {
 }
 
 std::string probability_text(double p) {
-  if (!std::isfinite(p)) return brief(p);
-  if (p > 0.97) return "> 0.97";
-  if (p < 0.005) return "< 0.01";
-  return fmt::format("{:.2f}", p);
+  if (p > 0.97) return "> 97\u00a0%";
+  if (p < 0.005) return "< 1\u00a0%";
+  return percent(std::round(100 * p) / 100);
 }
 
 std::string enumerate(std::span<const std::string> items, std::string_view last) {

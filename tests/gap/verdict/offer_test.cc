@@ -73,7 +73,7 @@ TEST(Offer, AcceptsUncontestedOffer) {
 TEST(Offer, RejectsEmptyOfferDespiteForce) {
   Diagnosis d = made_diagnosis();
   d.adoptable.clear();
-  d.refusal = "nothing was found that a robot file could take";
+  d.refusal = "no change of the robot file was found";
   const Error error = refused(d, {{}, true});
   EXPECT_EQ(error.fault, Fault::conflict);
   EXPECT_EQ(error.message, d.refusal);

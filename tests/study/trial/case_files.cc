@@ -9,7 +9,6 @@
 
 #include "base/text_file.h"
 #include "client/files.h"
-#include "client/virtual_robot/simulate.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"

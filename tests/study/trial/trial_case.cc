@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/simulate.h"
 #include "tests/study/trial/plant_variants.h"
 #include "tests/study/trial/robot_draw.h"
+#include "tests/support/simulated_missions.h"
 
 namespace joulecast::trial {
 namespace {

@@ -43,7 +43,7 @@ const nodeColumns = (own) => [
     hint: 'time until other daemons take over its robots, unless it renews the lease',
   }),
   count('kept', 'Keeps', (n) => n.robots_kept),
-  count('heard', 'Hears', (n) => n.robots_heard),
+  count('heard', 'Receives', (n) => n.robots_heard),
 ];
 
 // Seconds of an open mission that are not stored yet; null where none runs.

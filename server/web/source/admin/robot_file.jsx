@@ -9,20 +9,14 @@ import { forgetModel } from '../models.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
 import { Answer, Button, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
-import { Changes, changesOf } from '../views/changes.jsx';
+import { Changes, changesOf, unitOf } from '../views/changes.jsx';
 import { Field, NumberInput, SelectField, fieldsOf } from '../views/choosing.jsx';
 
 const reviewMs = 300;
-const units = new Map(
-  'nm_s_rad=N m s/rad,v_s_rad=V s/rad,kg_m2=kg m²,rad_s=rad/s,nm_a=N m/A,m_s2=m/s²,m_s=m/s,k_w=K/W,ohm=Ω,nm=N m,kg=kg,ah=Ah,m=m,h=H,v=V,w=W,a=A,s=s,k=K'
-    .split(',')
-    .map((pair) => pair.split('=')),
-);
 
 function named(key) {
-  const unit = [...units.keys()].find((end) => key.endsWith(`_${end}`));
-  const name = format.words(unit ? key.slice(0, -unit.length - 1) : key);
-  return { label: name[0].toUpperCase() + name.slice(1), unit: units.get(unit) };
+  const [name, unit] = unitOf(key);
+  return { label: name[0].toUpperCase() + name.slice(1), unit };
 }
 
 // The groups of the form: fields that are a number, a pair of numbers or a text. Others are kept as the file
@@ -157,7 +151,7 @@ function Review({ of, file }) {
           ['Top speed of the motors', format.unit(of.top_speed_m_s, 'm/s')],
           ['Greatest acceleration', format.unit(of.acceleration_m_s2, 'm/s²')],
           ['Full battery', format.unit(of.energy_wh, 'Wh')],
-          ['At rest it lasts', hours],
+          ['Run time at rest', hours],
         ]}
       />
       {missing.length > 0 && (
@@ -200,11 +194,11 @@ function Sources({ onFile, onError }) {
     );
   return (
     <div class="filters">
-      <Field label="Robot file from the disk">
+      <Field label="Load a robot file">
         <input type="file" accept=".json,application/json" onChange={read} />
       </Field>
       <SelectField
-        label="Values of another robot"
+        label="Copy the values of a robot"
         value=""
         onChange={copy}
         options={[['', 'choose …'], ...models]}
@@ -316,7 +310,7 @@ function Form({ groups, id, stored, begun }) {
     refusalFor('admin') ??
     (faulty ? 'The file has faults.' : undefined) ??
     (!stored && known ? `There is a robot ${name} already.` : undefined) ??
-    (stored && changes.length === 0 ? 'Nothing is changed.' : undefined);
+    (stored && changes.length === 0 ? 'Nothing has changed.' : undefined);
   const save = () =>
     put(`/v1/robots/${idPath(name)}`, file).then(() => {
       forgetModel(name);

@@ -69,16 +69,16 @@ export function BackTest({ test }) {
       <div class={`verdict-box ${test.improves ? 'makes' : 'fails'}`}>
         <p class="verdict">
           On {test.missions.length} missions that were not used for the fit, the energy error{' '}
-          {falls ? 'falls' : 'goes'} from <b>{share(test.error_before, 2)}</b> to{' '}
+          {falls ? 'falls' : 'rises'} from <b>{share(test.error_before, 2)}</b> to{' '}
           <b>{share(test.error_after, 2)}</b>.
         </p>
         <p class="note">
-          Improvement {rangeOf(test.improvement_ci, 2)} (95 % interval); power gap{' '}
-          {share(test.power_gap_before, 2)} to {share(test.power_gap_after, 2)}, falls by{' '}
-          {rangeOf(test.power_gap_fall_ci, 2)}
+          Improvement {rangeOf(test.improvement_ci, 2)} (95 % interval). Power gap{' '}
+          {share(test.power_gap_before, 2)} before, {share(test.power_gap_after, 2)} after; it falls by{' '}
+          {rangeOf(test.power_gap_fall_ci, 2)} (95 % interval).
           {format.known(test.voltage_gap_before) &&
-            `; voltage gap ${share(test.voltage_gap_before, 2)} to ${share(test.voltage_gap_after, 2)}`}
-          ; compared with model version {test.tested_against}.{left && ` Left out: ${left}.`}
+            ` Voltage gap ${share(test.voltage_gap_before, 2)} before, ${share(test.voltage_gap_after, 2)} after.`}{' '}
+          Compared with model version {test.tested_against}.{left && ` Excluded: ${left}.`}
         </p>
       </div>
       <TestTable missions={test.missions} />

@@ -1,7 +1,18 @@
 // Robot files as lists of parameters, and the differences between two of them.
 import * as format from '../format.js';
 
+const units = new Map(
+  'nm_s_rad=N m s/rad,v_s_rad=V s/rad,kg_m2=kg m²,rad_s=rad/s,nm_a=N m/A,m_s2=m/s²,m_s=m/s,k_w=K/W,ohm=Ω,nm=N m,kg=kg,ah=Ah,m=m,h=H,v=V,w=W,a=A,s=s,k=K,rad=rad'
+    .split(',')
+    .map((pair) => pair.split('=')),
+);
 const mostShown = 12;
+
+// "speed_m_s" -> ["speed", "m/s"]
+export function unitOf(name) {
+  const end = [...units.keys()].find((unit) => name.endsWith(`_${unit}`));
+  return [format.words(end ? name.slice(0, -end.length - 1) : name), units.get(end) ?? ''];
+}
 
 function text(value) {
   return typeof value === 'number' ? format.digits(value, 4) : String(value);

@@ -161,7 +161,7 @@ export function Several({ label, one, value, onChange, options, none }) {
             key={id}
             type="button"
             class="chip"
-            aria-label={`Leave out ${names.get(id) ?? id}`}
+            aria-label={`Remove ${names.get(id) ?? id}`}
             onClick={() => onChange(chosen.filter((other) => other !== id).join(','))}
           >
             {names.get(id) ?? id} ×

@@ -3,6 +3,7 @@ import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
+import { unitOf } from './changes.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdicts } from './jobs.jsx';
@@ -13,27 +14,11 @@ const channels = {
   motor_voltage: 'motor voltage',
   battery_voltage: 'battery voltage',
 };
-const suffixes = [
-  ['_m_s2', 'm/s²'],
-  ['_rad_s', 'rad/s'],
-  ['_m_s', 'm/s'],
-  ['_kg', 'kg'],
-  ['_nm', 'N m'],
-  ['_rad', 'rad'],
-  ['_s', 's'],
-  ['_m', 'm'],
-  ['_w', 'W'],
-];
-
-// "speed_m_s" -> ["speed", "m/s"]
-function unitOf(name) {
-  const [suffix, unit] = suffixes.find(([s]) => name.endsWith(s)) ?? ['', ''];
-  return [name.slice(0, name.length - suffix.length), unit];
-}
 
 // Ratios are relative changes of the model's value; angles are shown in degrees, slopes also in percent.
 function strength(effect, name, { value, sd, unit }) {
   const scaled = (factor) => format.withDeviation(factor * value, format.known(sd) ? factor * sd : sd);
+  if (name === 'side') return value < 0.5 ? 'right' : 'left';
   if (name === 'ratio') return `${value < 0 ? '' : '+'}${scaled(100)} %`;
   if (unit === 'rad' || unit === 'rad/s') {
     const slope = /tilt|grade|slope|climb/.test(`${effect} ${name}`) && Math.abs(value) < 0.5;
@@ -47,8 +32,11 @@ function strength(effect, name, { value, sd, unit }) {
 function strengths({ id, parameters: all }) {
   const place = all.x_m && all.y_m;
   const lines = Object.entries(all)
-    .filter(([name, p]) => (p.value !== 0 || p.sd > 0) && !(place && ['x_m', 'y_m'].includes(name)))
-    .map(([name, p]) => [name === 'ratio' ? 'by' : format.words(unitOf(name)[0]), strength(id, name, p)]);
+    .filter(
+      ([name, p]) =>
+        (p.value !== 0 || p.sd > 0 || name === 'side') && !(place && ['x_m', 'y_m'].includes(name)),
+    )
+    .map(([name, p]) => [name === 'ratio' ? 'by' : unitOf(name)[0], strength(id, name, p)]);
   if (place) lines.push(['centre', `(${format.digits(all.x_m.value)}, ${format.digits(all.y_m.value)}) m`]);
   return lines.map(([name, text]) => (
     <div key={name}>
@@ -59,8 +47,7 @@ function strengths({ id, parameters: all }) {
 
 // "speed_m_s" from 0.2 to 0.4 -> ["speed", "0.2 to 0.4 m/s"]
 function region(w) {
-  const [plain, unit] = unitOf(w.variable);
-  const name = format.words(plain);
+  const [name, unit] = unitOf(w.variable);
   if (typeof w.from === 'string') return [name, unit ? `${w.from.replaceAll('-', '−')} ${unit}` : w.from];
   if (!unit.startsWith('rad')) return [name, `${format.range(w.from, w.to)} ${unit}`];
   return [name, `${format.range(format.degrees(w.from), format.degrees(w.to))} °${unit.slice(3)}`];
@@ -106,8 +93,8 @@ function Where({ regions }) {
         }))}
       />
       <p class="note foot">
-        Bar: share of the gap in power; upright mark: share of the time, which the gap would have if it were
-        everywhere alike; line: 95 % interval. Regions overlap.
+        Bar: share of the gap in power. Upright mark: share of the time; a uniform gap would reach it. Line:
+        95 % interval. Regions overlap.
       </p>
     </>
   );
@@ -123,17 +110,17 @@ const effectColumns = [
         {e.workshop && <span class="note check">check: {e.workshop}</span>}
         {e.power_w > 0 && <span class="note check">{format.text(format.power(e.power_w))} on average</span>}
         {e.calibrates && <span class="note check">corrects {e.calibrates} of the robot file</span>}
-        {e.varies >= 0.01 && (
-          <span class="note check">varies by {share(e.varies, 0)} along the missions</span>
-        )}
+        {e.varies >= 0.01 && <span class="note check">varies by {share(e.varies, 0)} between missions</span>}
       </>
     ),
     { head: true },
   ),
   figure('probability', 'Probability', (e) => chance(e.probability)),
   column('strength', 'Strength', strengths),
-  figure('share', 'Gap without it', (e) => share(e.share, 0)),
-  figure('group', 'Of its group', (e) => chance(e.group), {
+  figure('share', 'Returns without it', (e) => share(e.share, 0), {
+    hint: 'part of the closed gap that returns if this effect is omitted',
+  }),
+  figure('group', 'Group', (e) => chance(e.group), {
     hint: 'probability that it or one of the effects confounded with it is present',
   }),
   column('alternatives', 'Confounded with', (e) => e.alternatives.map(effectName).join(', ') || '–', {
@@ -156,20 +143,22 @@ function Checks({ checks }) {
 }
 
 const barOf = (name, value, note) => ({ name, value, of: format.percent(value, 1), channel: 'plain', note });
+// "v^2" as "v²".
+const powers = (text) => text.replaceAll('^2', '²').replaceAll('^3', '³');
 const termColumns = [
   column(
     'term',
     'Term',
     ([name, t]) => (
       <>
-        {name} <span class="note check">{t.unit}</span>
+        {powers(name)} <span class="note check">{powers(t.unit)}</span>
       </>
     ),
     { head: true },
   ),
   figure('data', 'In the data', ([, t]) => format.withDeviation(t.value, t.sd)),
-  figure('model', 'Robot file', ([, t]) => format.digits(t.model)),
-  figure('explained', 'With the effects', ([, t]) => format.digits(t.explained)),
+  figure('model', 'Robot file', ([, t]) => format.likeDeviation(t.model, t.sd)),
+  figure('explained', 'This diagnosis', ([, t]) => format.likeDeviation(t.explained, t.sd)),
 ];
 
 // The diagnosis compared with a linear regression, on the same held-out parts.
@@ -188,7 +177,7 @@ function Regression({ of }) {
       )}
       <Texts of={of.says} />
       <p class="note foot">
-        Held-out error of the power: on parts of the missions that were not used for the fit.
+        Power error on held-out data: parts of the missions that were not used for the fit.
       </p>
     </Panel>
   );
@@ -265,7 +254,7 @@ function Readings({ channels: all }) {
   const rows = Object.entries(all).filter(([, c]) => format.known(c.absolute_relative));
   if (rows.length === 0) return null;
   return (
-    <Panel title="Gap of each kind of reading">
+    <Panel title="Error of each kind of reading">
       <Bars
         rows={rows.map(([name, c]) =>
           barOf(channels[name] ?? format.words(name), c.absolute_relative, `noise ${share(c.noise_floor)}`),
@@ -278,12 +267,12 @@ function Readings({ channels: all }) {
 const limitsOf = (r) =>
   [
     !r.motor_channels &&
-      'Currents of the motors were not recorded: effects in motors, drivers and friction are harder to distinguish.',
+      'Motor currents were not recorded: effects in motors, drivers and friction are harder to distinguish.',
     r.power === 'motors' &&
-      'The battery was not recorded: power is that of the motors with the idle power of the robot file.',
+      'The battery was not recorded: power is that of the motors plus the idle power of the robot file.',
     r.power === 'none' && 'No power was recorded: effects are estimated from other readings.',
     r.gap.detectable_share > 0 &&
-      `An effect of less than ${share(r.gap.detectable_share)} of the power would not be seen.`,
+      `An effect of less than ${share(r.gap.detectable_share)} of the power is not detectable.`,
     ...(r.limits ?? []),
     ...(r.notes ?? []),
   ].filter(Boolean);

@@ -155,7 +155,7 @@ export function PowerFigure({ power, after }) {
   const make = () => {
     const c = palette();
     return {
-      axes: [axis('time since the mission began, s', { size: 28 }), axis('power, W')],
+      axes: [axis('time since the start, s', { size: 28 }), axis('power, W')],
       series: [{}, line(c.measured), line(c.gap), ...(after ? [line(c.modelled)] : [])],
     };
   };
@@ -176,8 +176,8 @@ export function PowerFigure({ power, after }) {
 
 const missionColumns = [
   column('id', 'Mission', (m) => m.mission_id, { head: true }),
-  column('start', 'Began', (m) => format.time(m.start_utime_us), { class: 'when' }),
-  figure('length', 'Lasted', (m) => format.span(m.length_s)),
+  column('start', 'Started', (m) => format.time(m.start_utime_us), { class: 'when' }),
+  figure('length', 'Duration', (m) => format.span(m.length_s)),
   figure('payload', 'Payload, kg', (m) => format.digits(m.payload_kg)),
   ...[
     ['energy_before', 'Gap in energy'],

@@ -8,7 +8,7 @@ const perMetre = (value) => format.signed(format.digits(value));
 const groupColumns = [
   column('name', 'Group', (g) => g.name, { head: true }),
   figure('missions', 'Missions', (g) => g.missions),
-  figure('way', 'Driven, m', (g) => format.digits(g.way_m)),
+  figure('way', 'Distance, m', (g) => format.digits(g.way_m)),
   figure('energy', 'Measured, J/m', (g) => format.digits(g.energy_per_m_j)),
   figure('model', 'Modelled, J/m', (g) => format.digits(g.model_per_m_j)),
 ];
@@ -63,15 +63,15 @@ const runColumns = [
   column('run', 'Run', (r) => (r.table ? `${r.table}: ${r.run}` : r.run), { head: true }),
   figure('measured', 'Measured, J', (r) => format.digits(r.measured_j)),
   figure('model', 'Error of the model', off('model_j')),
-  figure('held', 'with causes, run left out', off('held_out_j')),
+  figure('held', 'With the effects, run held out', off('held_out_j')),
 ];
 const conditionColumns = [
-  column('left', 'Left out', (c) => c.left_out, { head: true }),
+  column('left', 'Held out', (c) => c.left_out, { head: true }),
   figure('runs', 'Runs', (c) => c.runs),
   figure('before', 'Robot file', (c) => share(c.held_out_before)),
-  figure('after', 'with causes', (c) => share(c.held_out_after)),
+  figure('after', 'With the effects', (c) => share(c.held_out_after)),
   figure('baseline', 'Regression', (c) => share(c.baseline_held_out)),
-  column('named', 'Named', (c) => c.effects.map(effectName).join(', ') || '–', { class: 'words' }),
+  column('named', 'Effects', (c) => c.effects.map(effectName).join(', ') || '–', { class: 'words' }),
 ];
 
 export function Runs({ of: r }) {
@@ -81,15 +81,15 @@ export function Runs({ of: r }) {
         title="Runs"
         columns={runColumns}
         rows={r.runs}
-        note={`Error: measured less modelled energy, of the measured. Runs scatter by ${share(r.scatter.run)} without a cause.`}
+        note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
       />
       {r.left_out_conditions.length > 0 && (
         <TablePanel
-          title="Conditions left out"
+          title="Conditions held out"
           columns={conditionColumns}
           rows={r.left_out_conditions}
           keyOf={(c) => c.left_out}
-          note="Mean error of the runs of a condition, predicted by a diagnosis and a regression without them."
+          note="Mean error of the runs of a condition, predicted by a diagnosis and a linear regression of the other runs."
         />
       )}
     </>

@@ -102,7 +102,10 @@ export function DrawPath({ points, change, height = 400 }) {
         {button('Clear', () => change([]), points.length === 0)}
         {button('+', () => setAcross(acrossM / 2), acrossM <= 4, 'Closer')}
         {button('−', () => setAcross(acrossM * 2), acrossM >= 256, 'Wider')}
-        <span class="note">Press to add, drag to move; snaps to {snapM} m. Corners are turned in place.</span>
+        <span class="note">
+          Click to add a point, drag to move it; points snap to {snapM} m. The robot turns in place at
+          corners.
+        </span>
       </div>
     </div>
   );

@@ -5,7 +5,7 @@ import { useNewest } from '../logs.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column } from '../table.jsx';
 
-const origins = { diagnosis: 'a diagnosis', proposal: 'a proposal', file: 'a robot file', http: 'HTTP' };
+const origins = { diagnosis: 'a diagnosis', proposal: 'a proposal', file: 'a robot file', http: 'an upload' };
 
 const kinds = {
   model_adopted: [
@@ -44,11 +44,11 @@ const kinds = {
   contradiction: ['Telemetry contradicted', (d) => d.says],
   contradiction_ended: ['Telemetry no longer contradicted', (d) => d.message],
   robot_silent: ['Silent', (d) => d.message],
-  robot_back: ['Telemetry again', (d) => `it was silent since ${format.time(d.since_utime_us)}`],
+  robot_back: ['Telemetry resumed', (d) => `silent since ${format.time(d.since_utime_us)}`],
   charge_low: ['Charge low', (d) => d.message],
-  charge_restored: ['Charge restored', (d) => `it was low since ${format.time(d.since_utime_us)}`],
+  charge_restored: ['Charge restored', (d) => `low since ${format.time(d.since_utime_us)}`],
   mission_annulled: ['Mission annulled', (d) => d.reason],
-  mission_id_reused: ['Mission name used again', (d) => d.mission_id],
+  mission_id_reused: ['Mission id reused', (d) => d.mission_id],
   robot_removed: [
     'Robot removed',
     (d) =>

@@ -1,5 +1,4 @@
-import { Component } from 'preact';
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { needsSomeone, useAttention } from '../attention.js';
 import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
@@ -112,20 +111,15 @@ const filters = {
   ],
 };
 
-class Row extends Component {
-  shouldComponentUpdate(next) {
-    return ['revision', 'entry', 'index', 'needs', 'ratio', 'unit'].some(
-      (key) => next[key] !== this.props[key],
-    );
-  }
-  render({ entry, index, ...more }) {
-    return (
+const Row = ({ entry, index, ...more }) =>
+  useMemo(
+    () => (
       <tr aria-rowindex={index + 2} class={entry.state.live ? '' : 'quiet'}>
         <Cells columns={columns} row={{ ...entry, entry, ...more }} />
       </tr>
-    );
-  }
-}
+    ),
+    [entry.revision, entry, index, more.needs, more.ratio, more.unit],
+  );
 
 function chosen(robots, text, keep, attention) {
   const wanted = text.trim().toLowerCase();
@@ -220,7 +214,7 @@ function useTodayRow() {
   const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
   const parts = [
     today.wh_per_km !== null && format.text(consumption(perMetre(today))),
-    then > 0 && `${format.signed(format.share(now / then - 1))} to last ${weekday}`,
+    then > 0 && `${format.signed(format.share(now / then - 1))} against last ${weekday}`,
     ...worthTexts(tariff, now),
   ];
   return ['Today', energy(now), parts.filter(Boolean).join(', ')];
@@ -269,7 +263,6 @@ function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
           <Row
             key={entry.id}
             entry={entry}
-            revision={entry.revision}
             index={first + k}
             needs={attention.get(entry.id)}
             ratio={ratios.get(entry.id)}

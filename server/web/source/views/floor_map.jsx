@@ -44,7 +44,7 @@ const subjects = {
     const { u } = consumption(1);
     const per = u === 'J/m' ? 1 : 3.6;
     return {
-      title: 'energy over distance',
+      title: 'consumption',
       kind: 'power',
       unit: u,
       value: (c) => (c.energy_j_per_m === null ? null : c.energy_j_per_m / per),
@@ -88,7 +88,7 @@ function Marked({ cell, side }) {
     );
   const rows = [
     ['Square', square(cell, side)],
-    ['Energy over distance', consumption(cell.energy_j_per_m)],
+    ['Consumption', consumption(cell.energy_j_per_m)],
     ['Departure (95 %)', departure(cell)],
     ['Ratio', format.fixed(cell.ratio, 3)],
     ['Time', format.span(cell.covered_s)],
@@ -126,7 +126,7 @@ function Zones({ map, onMark }) {
       hint: 'from the models times each mission’s usual ratio',
     }),
     figure('excess', 'Excess', (z) => <Quantity of={energyIn(scale, z.excess_j)} sign />),
-    figure('distance', 'Driven', (z) => format.length(z.distance_m)),
+    figure('distance', 'Distance', (z) => format.length(z.distance_m)),
     figure('time', 'Time', (z) => format.span(z.covered_s)),
   ];
   const rows = map.zones.map((z, k) => ({ ...z, number: k + 1 }));
@@ -160,7 +160,7 @@ function Squares({ map }) {
   ];
   return (
     <details class="model" open={!narrow}>
-      <summary>The {shown.length} squares of greatest excess energy, as a table</summary>
+      <summary>The {shown.length} squares with the greatest excess energy</summary>
       <Table class="squares" columns={columns} rows={shown} keyOf={(c) => `${c.x_m} ${c.y_m}`} />
     </details>
   );
@@ -171,13 +171,13 @@ function Summary({ map }) {
   const all = map.missions_read === map.missions;
   const rows = [
     ['Energy', energy(map.energy_j), worthTexts(tariff, map.energy_j).join(', '), 'measured'],
-    ['Driven', format.length(map.distance_m)],
-    ['Energy over distance', consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)],
+    ['Distance', format.length(map.distance_m)],
+    ['Consumption', consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)],
     ['Ratio', format.fixed(map.ratio, 3)],
     [
       'Missions',
       format.fixed(map.missions_read),
-      `of ${all ? format.count(map.robots.length, 'robot') : `${format.fixed(map.missions)}, an even share`}`,
+      `of ${all ? format.count(map.robots.length, 'robot') : `${format.fixed(map.missions)}, evenly sampled`}`,
     ],
     ['Zones', `${map.zones.length}`, '', map.zones.length > 0 ? 'gap' : ''],
   ];

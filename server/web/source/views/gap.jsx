@@ -41,7 +41,7 @@ function Progress({ job, onEnd }) {
   const words =
     now.state === 'queued'
       ? now.ahead > 0
-        ? `${now.ahead} before it`
+        ? `${format.count(now.ahead, 'diagnosis', 'diagnoses')} before it`
         : 'about to start'
       : `${part} %${left}`;
   return (
@@ -81,12 +81,8 @@ function Start({ given, onStart }) {
     event.preventDefault();
     setBusy(true);
     setError(null);
-    try {
-      const job = await post('/v1/diagnoses', { robot_id: chosen, max_missions: Number(missions) });
-      onStart(job);
-    } catch (problem) {
-      setError(problem);
-    }
+    const body = { robot_id: chosen, max_missions: Number(missions) };
+    await post('/v1/diagnoses', body).then(onStart, setError);
     setBusy(false);
   };
   if (live.loaded && robots.length === 0)
@@ -132,7 +128,7 @@ function Start({ given, onStart }) {
         ) : (
           <>
             {count !== null && `${format.count(count, 'finished mission')}. `}
-            Every fourth is held back to test the result.
+            Every fourth is held out to test the result.
           </>
         )}
       </p>

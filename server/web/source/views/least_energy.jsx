@@ -9,7 +9,7 @@ import { Empty, Failure, Loading } from '../widgets.jsx';
 function carriedNote(mission, payloads) {
   const kg = (value) => format.text(format.unit(value, 'kg'));
   if (payloads === null)
-    return `with the declared payload of ${kg(mission.payload_kg ?? 0)} all the way, without changes of payload`;
+    return `with the payload at the start, ${kg(mission.payload_kg ?? 0)}, on all legs; its changes were not read`;
   const [low, high] = [Math.min(...payloads), Math.max(...payloads)];
   return low === high
     ? `payload ${kg(low)}`
@@ -33,7 +33,7 @@ function Saving({ share }) {
       </>
     );
   return share > -0.005
-    ? 'Driven about as cheaply as the model allows.'
+    ? 'This drive used about as little energy as the model allows.'
     : 'Less energy than these legs need with stops between them: the robot turned while it drove.';
 }
 
@@ -46,8 +46,8 @@ function Footnote({ mission, request, payloads, version }) {
       {format.count(legs, 'leg')} between stops, {format.text(format.length(mission.energy.distance_m))} in
       all, {format.fixed(format.degrees(sum('angle_rad')))}° turned at the stops,
       {stoodS > 0 ? ` ${format.span(stoodS)} at rest as in the mission,` : ''}{' '}
-      {carriedNote(mission, payloads)}, arriving no later. Both energies are by model version {version}, that
-      of the mission.
+      {carriedNote(mission, payloads)}, arriving no later. Both energies are computed with model version{' '}
+      {version}, that of the mission.
     </p>
   );
 }

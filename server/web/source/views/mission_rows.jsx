@@ -55,8 +55,8 @@ export function missionColumns(missions, models, withRobot) {
       class: 'figure wide',
     }),
     figure('energy', 'Energy', (m) => energyIn(scale, m.energy.battery_j)),
-    figure('charge', 'Of charge', (m) => format.percent(share(m), 2), {
-      hint: 'share of the full battery, if the robot file states its capacity',
+    figure('charge', 'Charge used', (m) => format.percent(share(m), 2), {
+      hint: 'share of a full battery, if the robot file states its capacity',
     }),
     figure('modelled', 'Modelled', (m) => energyIn(scale, m.energy.modelled_j), {
       class: 'figure wide',

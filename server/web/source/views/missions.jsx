@@ -144,7 +144,9 @@ function List({ given, list, total, sort, onSort }) {
       <SortChoice columns={missionColumns(rows, models, true)} sort={sort} onSort={onSort} />
       <div class={list.loading ? 'stale' : ''} aria-busy={String(list.loading)}>
         {rows.length === 0 ? (
-          <Empty title={title}>Missions appear when a robot announces one or sends telemetry.</Empty>
+          <Empty title={title}>
+            Missions appear when a robot with a robot file announces one or sends telemetry.
+          </Empty>
         ) : (
           <MissionTable missions={rows} sort={sort} onSort={onSort} />
         )}

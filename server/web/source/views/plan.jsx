@@ -124,7 +124,7 @@ function FrontPanel({ answer, take }) {
   return (
     <Panel class="screen" title="Energy against time">
       {answer.pareto.length < 2 ? (
-        <Empty title="Nothing to trade">Time and energy do not compete on this path.</Empty>
+        <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>
       ) : (
         <Front answer={answer} take={take} />
       )}
@@ -164,7 +164,7 @@ function Result({ plan, path, take }) {
             />
           </Panel>
           <FrontPanel answer={answer} take={take} />
-          <Panel title="How exact the plan is">
+          <Panel title="Accuracy of the plan">
             <Certificate answer={answer} />
           </Panel>
         </div>

@@ -99,8 +99,8 @@ export function SpeedChart({ answer }) {
 export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW }, shortestS) {
   if (durationS <= shortestS * 1.001) return 'no shorter time is possible: the robot is at its limits';
   if (!(priceW >= 0.005)) return 'this is the duration of least energy';
-  const price = `${format.text(energy(priceW))} per second or more`;
-  return durationS - shortestS < 1 ? `less time costs ${price}` : `one second less costs ${price}`;
+  const price = `at least ${format.text(energy(priceW))}`;
+  return durationS - shortestS < 1 ? `less time costs ${price} per second` : `one second less costs ${price}`;
 }
 
 // From zero, so that a front that barely saves anything is shown flat.
@@ -167,7 +167,7 @@ export function Front({ answer, take }) {
           </span>
           ; {priceOfHaste(point, answer.certificate.shortest_time_s)}
         </span>
-        <Button onClick={() => take(point)}>Take as deadline</Button>
+        <Button onClick={() => take(point)}>Use as deadline</Button>
       </div>
     </>
   );

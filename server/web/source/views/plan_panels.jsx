@@ -8,7 +8,7 @@ import { Facts, Failure } from '../widgets.jsx';
 import { priceOfHaste } from './plan_charts.jsx';
 
 const methods = {
-  closed_form: 'closed formulas',
+  closed_form: 'closed-form formulas',
   interior_point: 'an interior-point method',
   mixed: 'several methods',
   quadrature: 'quadrature over the speed',
@@ -22,11 +22,11 @@ export function Certificate({ answer }) {
     ['Computed by', methods[c.method] ?? format.words(c.method)],
     ['Above the optimum', above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.share(above)}`],
     ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
-    ['A shorter time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
+    ['Cost of less time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
     [
       'Shortest time',
       format.known(c.shortest_time_s)
-        ? `${format.fixed(c.shortest_time_s, 2)} s, by the robot’s limits`
+        ? `${format.fixed(c.shortest_time_s, 2)} s, set by the robot’s limits`
         : 'not bounded',
     ],
     ['Limits reached', c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', ')],
@@ -59,7 +59,7 @@ function useBaselines(answer, request) {
 
 function noteOf(found, plan) {
   if (found === undefined) return 'computing …';
-  if (found === null) return 'not possible within the limits here';
+  if (found === null) return 'not possible within the limits';
   const saved = 1 - plan.energy_j / found.energyJ;
   const by = format.share(Math.abs(saved), 1);
   const time = `${format.span(found.durationS)}${found.slowed ? ', slowed to keep the limits' : ''}`;
@@ -80,7 +80,7 @@ export function Baselines({ answer, request }) {
     <>
       <EnergyBars label="Energy of the plan, a trapezoid and a triangle within the limits" rows={rows} />
       <p class="note foot">
-        Usual profiles on every run between stops, in the plan’s time where the robot’s limits allow it.
+        Each profile on every leg between stops, in the plan’s time if the robot’s limits allow it.
       </p>
     </>
   );

@@ -104,7 +104,7 @@ function RatioChart({ history }) {
       />
       <p class="note foot">
         <Key of={{ 'measured dot': 'mission', gap: `median of the last ${medianMissions},` }} />
-        now <b>{format.fixed(last, 3)}</b>; full vertical lines: new model versions; dashed:{' '}
+        now <b>{format.fixed(last, 3)}</b>; solid vertical lines: new model versions; dashed:{' '}
         {drift.length === 0 ? 'drifts (none)' : format.count(drift.length, 'drift')}.
       </p>
     </>

@@ -1,7 +1,7 @@
 // A mission over time and on the floor: power, speed, path, and every sample of the motors when zoomed.
 import { useMemo, useRef, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { Chart, axis, clockSteps, cursorOf, lastAt, line, withAlpha, withGaps } from '../chart.jsx';
+import { Chart, axis, clockSteps, lastAt, line, withAlpha, withGaps } from '../chart.jsx';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
@@ -11,7 +11,6 @@ import { runClock } from './clock.js';
 import { Motors } from './motors.jsx';
 
 const tracePoints = 700;
-const group = 'mission';
 // Columns for the chart, with an empty row where the trace pauses, so that no line bridges it.
 function withPauses({ start_utime_us: starts, width_us: width }, startUs, columns) {
   const times = withGaps(starts, 1.9 * width);
@@ -52,7 +51,9 @@ function Charts({ trace, mission, setZoom, setCursor }) {
     ],
   };
   const cursor = {
-    ...cursorOf(group),
+    sync: { key: 'mission' },
+    points: { size: 7, width: 1.5 },
+    focus: { prox: -1 },
     drag: { x: true, y: false, setScale: false, dist: 6 },
     bind: { dblclick: () => () => setZoom(null) },
   };
@@ -128,7 +129,7 @@ function Charts({ trace, mission, setZoom, setCursor }) {
 
 function AtCursor({ trace, mission, index }) {
   const at = index !== null && index < trace.start_utime_us.length ? index : null;
-  const of = (column, f) => (at === null ? { n: '–', u: '' } : f(column[at]));
+  const of = (column, f) => (at === null ? format.none : f(column[at]));
   const measured = trace.measured_power_w;
   const modelled = trace.modelled_power_w;
   const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];

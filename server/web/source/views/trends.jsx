@@ -1,4 +1,4 @@
-// Energy a day or week, consumption and ratio of the fleet or of robots side by side, compared with the
+// Energy per day or week, consumption and ratio of the fleet or of robots side by side, compared with the
 // period before; or of single missions.
 import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
@@ -222,7 +222,7 @@ function Charts({ series, kind }) {
   const { u: perUnit } = consumption(1);
   const shown = [
     {
-      title: `Energy a ${kind}`,
+      title: `Energy per ${kind}`,
       aside: `outlined: ${kind === 'day' ? 'today' : 'this week'} so far`,
       unit: scale.u,
       value: (g) => joule(g) / scale.joule,
@@ -231,7 +231,7 @@ function Charts({ series, kind }) {
     },
     {
       title: 'Consumption',
-      label: 'Energy over distance',
+      label: 'Consumption',
       unit: perUnit,
       value: (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km),
       zero: true,
@@ -267,7 +267,7 @@ function Sums({ now, before, period, robots }) {
   const changed = (label, value, of) => {
     const [a, b] = [value(before), value(now)];
     const known = a > 0 && b !== null;
-    return [label, of(b), known && `${format.signed(format.share(b / a - 1))} to the period compared`];
+    return [label, of(b), known && `${format.signed(format.share(b / a - 1))} against the compared period`];
   };
   const { stays, joule: put, whole } = charged ?? {};
   const notes = [`in ${format.count(stays, 'stay')}`, ...worthTexts(tariff, put)].join(', ');
@@ -280,7 +280,7 @@ function Sums({ now, before, period, robots }) {
       put > 0 && [
         'Not used in missions',
         format.percent((put - used) / put),
-        'of it: losses, use in between, higher charge',
+        'of which: losses, use between missions, higher charge',
       ],
     changed('Consumption', perMetre, consumption),
     changed('Distance', (t) => t.energy.distance_m, format.kilometres),

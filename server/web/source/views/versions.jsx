@@ -6,7 +6,7 @@ import { useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
 import { share } from './jobs.jsx';
 
-const origins = { file: 'a robot file', http: 'HTTP' };
+const origins = { file: 'a robot file', http: 'an upload' };
 
 function Evidence({ of: { back_test: test, forced, diagnosis_id: id } }) {
   const tested =
