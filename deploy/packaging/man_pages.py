@@ -66,7 +66,7 @@ def page(name, section, text, related, project):
 
 
 def commands_of(text):
-    return [left for heading, lines in sections(text) if heading == "Subcommands" for left, _ in rows(lines)]
+    return [left for heading, lines in sections(text) if heading == "Subcommands" for left, _ in rows(lines) if left]
 
 
 def main():
