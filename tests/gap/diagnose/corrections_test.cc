@@ -48,7 +48,7 @@ TEST(Diagnose, CorrectsUnitShownByPower) {
   const auto check = std::ranges::find(found->checks, "wheel_velocity_scale", &Check::id);
   ASSERT_NE(check, found->checks.end());
   EXPECT_FALSE(check->contradicted);
-  EXPECT_NE(check->says.find("divided by this factor, 2 (probability > 0.9"), std::string::npos)
+  EXPECT_NE(check->says.find("divided by this factor, 2 (probability > 97\u00a0%"), std::string::npos)
       << check->says;
 }
 

@@ -224,7 +224,7 @@ TEST(StateOffer, PredictsAsTheExplanation) {
 
 TEST(StateOffer, RefusesWithOneNumber) {
   const Diagnosis d = offered({.regression = 0.6, .explanation = 0.705, .adopts = false});
-  EXPECT_NE(d.refusal.find("falls by 0.5"), std::string::npos) << d.refusal;
+  EXPECT_NE(d.refusal.find("reduce the held-out error by 0.5"), std::string::npos) << d.refusal;
 }
 
 }  // namespace
