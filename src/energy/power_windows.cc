@@ -25,7 +25,7 @@ constexpr double file_resistance = 0.5;  // cold against warm is a third of it
 constexpr double file_scrub = 1;         // coefficient; a long wheel base has more than its rubber
 constexpr double file_driver = 0.05;     // of the motors' power
 constexpr double file_unreturned = 0.5;  // of the braking power
-constexpr double least_share = 0.05;     // of the file's inertia: a bound, as none is without
+constexpr double least_share = 0.05;     // of the file's inertia and resistance: a bound, as none is without
 
 // The yaw inertia of the wheels on their axle, the lower bound in robot files.
 double least_yaw_inertia(const robot::RobotModel& robot) {
@@ -175,7 +175,7 @@ Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, co
   set(PowerParameter::turning_inertia, inertia.turning, file_inertia * inertia.turning,
       wheel_inertia(lightest).turning);
   set(PowerParameter::resistance, motor.resistance_ohm,
-      resistance_known ? 0 : file_resistance * motor.resistance_ohm, 0);
+      resistance_known ? 0 : file_resistance * motor.resistance_ohm, least_share * motor.resistance_ohm);
   for (const auto& [which, expected, most] : {std::tuple{PowerParameter::turning_scrub, file_scrub, 3.0},
                                               std::tuple{PowerParameter::driver_loss, file_driver, 1.0},
                                               std::tuple{PowerParameter::unreturned, file_unreturned, 1.0}}) {
