@@ -47,6 +47,8 @@ export const clockSteps = [
 const dayChange = '\n{YYYY}-{MM}-{DD}';
 const clockFormat = (step, text) => [step, text, dayChange, null, dayChange, null, null, null, 1];
 export const clockAxis = {
+  size: 42,
+  space: 90,
   values: [
     [day, '{YYYY}-{MM}-{DD}', null, null, null, null, null, null, 1],
     clockFormat(minute, '{HH}:{mm}'),

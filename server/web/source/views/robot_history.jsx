@@ -74,7 +74,7 @@ function RatioChart({ history }) {
         x: { time: true, ...timesWith((spanS) => Math.max(60, 0.02 * spanS)) },
         y: { range: () => [1 - spread, 1 + spread] },
       },
-      axes: [axis('', { size: 42, space: 90, ...clockAxis }), axis('measured / modelled', { size: 56 })],
+      axes: [axis('', clockAxis), axis('measured / modelled', { size: 56 })],
       series: [
         {},
         {
