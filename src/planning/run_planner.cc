@@ -688,12 +688,15 @@ std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const st
     const double parts = nodes.size() > most_cells ? 1 : std::min(std::max(wanted, least[k]), most_parts),
                  part = (nodes[k + 1] - nodes[k]) / parts;
     auto knot = knot_after(nodes[k]);
-    for (; least[k] == at_knots && knot->way < nodes[k + 1]; ++knot) finer.push_back(knot->way);
-    for (double i = 1; i < parts && least[k] != at_knots; ++i) {
-      const double even = nodes[k] + part * i;
-      while (knot->way < even - 0.5 * part) ++knot;
-      const double way = knot->way < even + 0.5 * part ? knot->way : even;
-      if (way > finer.back() && way < nodes[k + 1]) finer.push_back(way);
+    if (least[k] == at_knots) {
+      for (; knot->way < nodes[k + 1]; ++knot) finer.push_back(knot->way);
+    } else {
+      for (double i = 1; i < parts; ++i) {
+        const double even = nodes[k] + part * i;
+        while (knot->way < even - 0.5 * part) ++knot;
+        const double way = knot->way < even + 0.5 * part ? knot->way : even;
+        if (way > finer.back() && way < nodes[k + 1]) finer.push_back(way);
+      }
     }
     finer.push_back(nodes[k + 1]);
   }

@@ -124,8 +124,9 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   };
   const auto most_change = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
   const auto highest = [](auto&& excess, double low, double high) {
-    const double at_high = excess(high), at_low = at_high > 0 ? excess(low) : 0;
+    const double at_high = excess(high);
     if (!(at_high > 0)) return high;
+    const double at_low = excess(low);
     return at_low < 0 ? (1 - just_below) * zero_between(excess, low, at_low, high, at_high) : low;
   };
   // The fastest at the far end of a cell that its near end and the motors allow.
