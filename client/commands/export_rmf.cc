@@ -195,8 +195,7 @@ void add_export_rmf(CLI::App& group, Exit& exit) {
   add_command<O>(
       group, exit, "rmf",
       "Write the battery, mechanical, ambient and tool parameters of an Open-RMF fleet configuration, fitted "
-      "to "
-      "missions",
+      "to missions",
       export_rmf,
       {server_row<O>(),
        {"robot,--robot-id", &O::robot_id, "robot of the server", named("ROBOT"), required},

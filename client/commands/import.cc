@@ -316,8 +316,7 @@ void add_import(CLI::App& program, Exit& exit) {
        {"--out", &O::out, "LCM event log to write", file_of("lcmlog"), required},
        {"--start", &O::start_utime_us,
         "time of the first row of tables without dates, UTC (2024-07-18T09:10:45Z) or microseconds since "
-        "1970; "
-        "further tables follow in the given order",
+        "1970; further tables follow in the given order",
         time_value()},
        {"--pause", &O::pause_s, "time between two tables with --start, s", positive()},
        {"--robot-id", &O::robot_id, "robot id, instead of the mapping's and the robot file's",

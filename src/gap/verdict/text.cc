@@ -144,8 +144,7 @@ class Reasons {
       return;
     }
     say("on held-out data the error of a linear regression of power on speed, turning and acceleration is "
-        "{}, "
-        "that of this explanation {}",
+        "{}, that of this explanation {}",
         percent(b.held_out), percent(b.explanation_held_out));
     said_.insert(said_.end(), b.says.begin(), b.says.end());
   }
