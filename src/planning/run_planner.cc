@@ -23,13 +23,12 @@ constexpr std::size_t most_cells = 200'000;
 // cells.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
 constexpr double lost_tolerance = 8e-5;
-constexpr double most_residual = 5e-3;  // relative, of stationarity
 // Relative to the shortest time: the greatest loss of its cells.
 constexpr double time_tolerance = 1e-4;
 // The greatest number of refinements, and of cells relative to the first grid: not all losses fall with the
 // size of cells.
 constexpr int most_rounds = 3;
-constexpr std::size_t most_growth = 8;
+constexpr std::size_t most_growth = 16, most_uniform_growth = 64;
 constexpr double near_limits = 0.01;  // of motors, in the middle of a cell whose knots are looked at
 constexpr double at_knots = std::numeric_limits<double>::infinity();  // parts of a cell: one for each knot
 
@@ -558,6 +557,13 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
       s = solver->solve(price_w, coarse_tolerance);
       if (!s.converged) break;
       for (std::size_t k = 0; k < s.ends_j.size(); ++k) lost_s[k] += s.ends_j[k] / price_w;
+    } else {
+      // The first and the last cell could hold the faster of their ends' speeds but for the acceleration.
+      for (const std::size_t k : {std::size_t{0}, grid.cells() - 1}) {
+        const double faster = std::sqrt(std::max(s.z[k], s.z[k + 1])), mean = mean_speed(s.z[k], s.z[k + 1]),
+                     ramp_s = 2 * (faster - mean) / grid.acceleration_limit;
+        lost_s[k] = (1 / mean - 1 / faster) * std::max(0.0, grid.step[k] - ramp_s * mean);
+      }
     }
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
@@ -759,6 +765,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     // Another price of time may need other nodes.
     if (std::exchange(refined_, false)) build(rough_nodes_);
     s = solve_rough_grid(price_w, stop, due);
+    // A first grid may not be as fast as finer ones.
+    if (due && !s.converged) s = solve_rough_grid(price_w, stop);
   }
   int iterations = s.iterations;
   std::vector<double> driven, lost;
@@ -768,7 +776,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     driven = driven_j(nodes_, s.z);
     lost = lost_j(s, driven);
     const double most = lost_tolerance * std::fabs(s.cost_j);
-    const bool grown = round == most_rounds || nodes_.size() >= (uniform_ ? 64 : 16) * rough_nodes_.size();
+    const bool grown = round == most_rounds ||
+                       nodes_.size() >= (uniform_ ? most_uniform_growth : most_growth) * rough_nodes_.size();
     const std::vector<double> parts = least_parts(solver_->grid(), nodes_, s.z, refined_ ? 1 : 2);
     if (refined_ && (grown || (sum_of(lost) <= most && std::ranges::max(parts) == 1))) break;
     const std::vector<double> coarse_nodes = nodes_;
@@ -785,7 +794,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
       rebuild(std::move(onto));
       return solver_->solve(s.price_w, fine_tolerance, stop, due);
     };
-    const auto stands = [](const SpeedSolution& of) { return of.converged && of.residual < most_residual; };
+    const auto stands = [](const SpeedSolution& of) { return of.converged && of.stationary(); };
     SpeedSolution finer = solved_on(
         uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
                               : split(nodes_, lost, 0.8 * most, parts));
@@ -799,8 +808,11 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
       break;
     }
     iterations += finer.iterations;
-    const double same_price_j = s.cost_j + (finer.price_w - s.price_w) * s.duration_s;
-    coarse_error_ = std::max(coarse_error_, std::fabs(same_price_j / finer.cost_j - 1));
+    // At one price; a change of price changes its optimum by that times a duration between the two.
+    const double dearer_w = finer.price_w - s.price_w,
+                 error_j = std::fabs(s.cost_j + dearer_w * s.duration_s - finer.cost_j) -
+                           std::fabs(dearer_w * (finer.duration_s - s.duration_s));
+    coarse_error_ = std::max(coarse_error_, error_j / std::fabs(finer.cost_j));
     refined_ = true;
     s = std::move(finer);
   }

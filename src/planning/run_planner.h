@@ -22,7 +22,7 @@ struct RunAnswer {
   std::unique_ptr<LineMotion> line;  // closed form, over the run's coordinate
   std::vector<double> way, speed;    // else nodes of it, the acceleration being constant in between
   double price_w = 0;
-  double energy_j = 0;               // on the solver's own quadrature, idle power included
+  double energy_j = 0;  // on the solver's own quadrature, idle power included
   double duration_s = 0;
   double gap_j = 0, discretisation_j = 0, residual = 0;
   bool convex = true;
@@ -46,7 +46,8 @@ class RunPlanner {
 
   // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
   // acceleration.
-  Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {}, const std::optional<Due>& due = {});
+  Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {},
+                          const std::optional<Due>& due = {});
   // The same on a first grid, which errs by some thousandths: near enough to search for a price of time.
   Result<RunAnswer> solve_roughly(double price_w, const std::stop_token& stop = {});
   // Where the closed form answers, over the run's length or another one.
@@ -90,7 +91,8 @@ class RunPlanner {
   Result<RunAnswer> fastest();
   const SpeedSolution& solve_rough_grid(double price_w, const std::stop_token& stop,
                                         const std::optional<Due>& due = {});
-  Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop, const std::optional<Due>& due);
+  Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop,
+                                   const std::optional<Due>& due);
   std::vector<double> driven_j(const std::vector<double>& nodes, const std::vector<double>& z) const;
   std::vector<double> lost_j(const SpeedSolution& s, const std::vector<double>& driven) const;
   RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes) const;

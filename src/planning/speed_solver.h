@@ -30,6 +30,8 @@ struct SpeedSolution {
   bool converged = false;
   int iterations = 0;
   std::array<bool, bound_count> binding{};
+
+  bool stationary() const { return residual < 5e-3; }  // relative
 };
 
 // The price of time is to be found, up to a highest one, that makes a profile last so long.
@@ -170,7 +172,8 @@ class SpeedSolver {
   double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
-  std::vector<double> gradient_, slope_, stationarity_, by_price_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
+  std::vector<double> gradient_, slope_, stationarity_, by_price_, diagonal_, off_, magnitude_, pivot_,
+      lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
   bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
