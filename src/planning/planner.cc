@@ -128,7 +128,7 @@ class Request {
     if (free && free->duration_s <= deadline * 1.02) {
       TRY(solve(problem_.value_of_time_w));
       if (duration_s() <= deadline) return {};
-      least_j_ = cost_j();
+      bound_by(deadline);
     } else if (!free) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (free.error().fault != Fault::infeasible || free.error().field != "value_of_time_w")
@@ -420,12 +420,13 @@ class Writer {
     for (std::size_t k = 0; k < times.size(); ++k) {
       const bool last = k + 1 == times.size();
       const State s = last ? at(k - 1, 1.0) : at(k, 0.0);
-      row(planner, s, start_s_ + times[k]);
+      const dynamics::PowerFlow<double> here = flow(planner, s);
+      row(planner, s, start_s_ + times[k], here.battery_power_w);
       if (last) break;
       const double span = times[k + 1] - times[k];
       const State next = at(k, 1.0);
       int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
-      if (loads_.electric().up != loads_.electric().down && turns(flow(planner, s), flow(planner, next)))
+      if (loads_.electric().up != loads_.electric().down && turns(here, flow(planner, next)))
         parts = std::max(parts, parts_of_turn);
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
@@ -501,10 +502,9 @@ class Writer {
     }
   }
 
-  void row(const RunPlanner& planner, const State& s, double time_s) {
+  void row(const RunPlanner& planner, const State& s, double time_s, double power) {
     const Run& run = planner.run();
     const Knot knot = run.at(s.way);
-    const double power = flow(planner, s).battery_power_w;
     if (run.turn != 0) {
       push(time_s, driven_m_, knot.pose, 0, run.turn * s.speed, 0, run.turn * s.acceleration, run.payload_kg,
            power);
