@@ -790,19 +790,10 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
       build(std::move(onto));
       solver_->start_from(start);
     };
-    const auto solved_on = [&](std::vector<double> onto) {
-      rebuild(std::move(onto));
-      return solver_->solve(s.price_w, fine_tolerance, stop, due);
-    };
-    const auto stands = [](const SpeedSolution& of) { return of.converged && of.stationary(); };
-    SpeedSolution finer = solved_on(
-        uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
-                              : split(nodes_, lost, 0.8 * most, parts));
-    // Where power is concave, some grids make it hard to find an optimum: even halves are the gentlest.
-    if (!stands(finer) && !refined_)
-      finer = solved_on(
-          split(coarse_nodes, std::vector<double>(lost.size()), 1, std::vector<double>(lost.size(), 2)));
-    if (!(refined_ ? stands(finer) : finer.converged)) {
+    rebuild(uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
+                                  : split(nodes_, lost, 0.8 * most, parts));
+    SpeedSolution finer = solver_->solve(s.price_w, fine_tolerance, stop, due);
+    if (!finer.converged || (refined_ && !finer.stationary())) {
       if (!refined_) s.gap_j = s.cost_j;  // the error of a coarse grid is unknown
       rebuild(coarse_nodes);
       break;
