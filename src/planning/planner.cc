@@ -256,6 +256,7 @@ class Request {
       const double most_w = 30 * std::max(usual_w_, 1e-3);
       near.most = std::max(at.x, std::log(most_w));
       if (runs_.size() == 1) {
+        // Found together with the motion, to the solver's tolerance of the duration.
         TRY_ASSIGN(const double y, roughly_late(at.x));
         const double guess = std::clamp(at.x - y / at.slope, at.least, near.most);
         TRY(solve(price_at(guess), Due{deadline * (1 - 2e-6) - dwell_s_, most_w}));

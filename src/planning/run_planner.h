@@ -45,7 +45,7 @@ class RunPlanner {
                                  const Problem& problem, double start_speed, double end_speed);
 
   // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
-  // acceleration.
+  // acceleration. On a grid, `due` makes the price a first guess.
   Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {},
                           const std::optional<Due>& due = {});
   // The same on a first grid, which errs by some thousandths: near enough to search for a price of time.

@@ -25,6 +25,7 @@ namespace joulecast::planning {
 // linearised, and multipliers keep a share of themselves in each step (19.9); a line search makes the barrier
 // function fall (3.4); an indefinite matrix is corrected along its diagonal (Waechter & Biegler, Math.
 // Program. 106 (2006), algorithm IC). mu falls by a factor (their (7)) when its problem is about solved.
+// Where a duration is due, the price of time is one more unknown, its equation one more row (follow_price).
 // Where the problem is convex, sum y_j s_j bounds the remaining decrease of F; it is reported as the gap.
 //
 // Where braking begins to return energy, F has terms half_jump |E|, E the energy of a motor in a cell. They

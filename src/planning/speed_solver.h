@@ -31,10 +31,10 @@ struct SpeedSolution {
   int iterations = 0;
   std::array<bool, bound_count> binding{};
 
-  bool stationary() const { return residual < 5e-3; }  // relative
+  bool stationary() const { return residual < 5e-3; }  // relative to the cost
 };
 
-// The price of time is to be found, up to a highest one, that makes a profile last so long.
+// The duration of a profile whose price of time is to be found, and the highest such price.
 struct Due {
   double duration_s = 0, most_w = 0;
 };
@@ -52,9 +52,10 @@ class SpeedSolver {
   const SpeedEnvelope& envelope();
 
   // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
-  // earlier the more the price has changed. Where scrub makes the problem not convex, a first solve also
-  // starts slow and fast, and takes the cheapest result. Not converged when a stop is requested; the profile,
-  // if any, is feasible.
+  // earlier the more the price has changed. With `due` the price is the first guess of one that is solved for
+  // together with the profile; not converged where it is dearer than allowed. Where scrub makes the problem
+  // not convex, a first solve also starts slow and fast, and takes the cheapest result. Not converged when a
+  // stop is requested; the profile, if any, is feasible.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {},
                       const std::optional<Due>& due = {});
 
