@@ -177,7 +177,8 @@ struct Application::Parts {
     const bool by_path = options.store_url.empty();
     TRY_ASSIGN(server::ClusterOptions wanted, cluster_options(options));
     if (!wanted.name.empty()) in_cluster = std::move(wanted);
-    TRY_ASSIGN(auto options_of_store, store_options(options));
+    history::StoreOptions options_of_store = options.store;
+    options_of_store.query_limit = options.http.request_deadline;
     if (in_cluster) {
       options_of_store.shared_writer = in_cluster->writer;
       options_of_store.on_dropped = [this](const std::string& robot_id, history::Epoch epoch,
@@ -374,7 +375,6 @@ struct Application::Parts {
     server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
     server::export_attention_metrics(metrics, *attention);
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
-    if (store->standby()) server::export_standby_metrics(metrics, *store);
     server::export_process_metrics(metrics);
     server::export_robot_metrics(metrics, fleet, *watch, host_utime_us, options.robots_with_metrics);
   }
