@@ -1,8 +1,6 @@
 #include "history/sql_store.h"
 
 #include <algorithm>
-#include <iterator>
-#include <optional>
 #include <random>
 
 #include "history/sql_queries.h"
