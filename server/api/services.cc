@@ -2,7 +2,6 @@
 
 #include <iterator>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 

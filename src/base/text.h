@@ -27,13 +27,12 @@ inline std::string_view take_item(std::string_view& list, char separator) {
 // The whole text as one finite number, independent of the locale; nullopt otherwise.
 template <class T>
 std::optional<T> to_number(std::string_view text) {
-  T value{};
-  const char* const end = text.data() + text.size();
-  if (std::from_chars(text.data(), end, value) != std::from_chars_result{end, std::errc{}})
-    return std::nullopt;
+  T number{};
+  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (fault != std::errc{} || end != text.data() + text.size()) return std::nullopt;
   if constexpr (std::is_floating_point_v<T>)
-    if (!std::isfinite(value)) return std::nullopt;
-  return value;
+    if (!std::isfinite(number)) return std::nullopt;
+  return number;
 }
 
 // FNV-1a, 64 bits, continued from `hash`. It detects mistakes and distinguishes versions; it does not resist
