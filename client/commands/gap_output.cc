@@ -356,15 +356,10 @@ void print_diagnosis(const Json& d, const std::string& unit) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  fmt::print("verdict: {} (probability {})\n", gap::verdict_words(text(d["verdict"])),
+  fmt::print("verdict: {} (probability {})\n", text(d.value("verdict_title", d["verdict"])),
              gap::probability_text(number_or_nan(d["verdict_probability"])));
   for (const Json& reason : member_at(d, "reasons")) print_item(text(reason));
   for (const Json& e : d["effects"]) print_effect(e);
-  if (!text(d["outside"]["channel"]).empty()) {
-    fmt::print("  outside the catalogue: {} follows {} (probability {})\n", text(d["outside"]["channel"]),
-               text(d["outside"]["follows"]),
-               gap::probability_text(number_or_nan(d["outside"]["probability"])));
-  }
   print_held_out(d);
   print_terms(d);
   print_corrections(d);

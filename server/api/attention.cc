@@ -96,8 +96,8 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
     reasons.push_back({"no_robot_file",
                        Severity::warning,
                        {},
-                       "Telemetry of a robot without a robot file is not recorded.",
-                       "Add its robot file."});
+                       "It has no robot file: its telemetry is counted, not recorded.",
+                       "Add its robot file on its page."});
   if (live && model != nullptr && !battery::at_charger(s.charge.phase) &&
       s.state_of_charge < model->robot.battery.reserve_fraction)  // false for NaN
     reasons.push_back({"charge_low",

@@ -60,6 +60,7 @@ Json summary_of(const ordered_json& result) {
                        {"share", effect["share"]},
                        {"alternatives", effect["alternatives"]}});
   return {{"verdict", result["verdict"]},
+          {"verdict_title", result["verdict_title"]},
           {"gap", result["gap"]},
           {"effects", effects},
           {"shrinkage", result["shrinkage"]}};
