@@ -217,8 +217,8 @@ void print_effect(const Json& e) {
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {
-      if (p["sd"].is_number() != estimated) continue;
       const double value = number_or_nan(p["value"]);
+      if (p["sd"].is_number() != estimated || (!estimated && value == 0 && name != "side")) continue;
       fmt::print("    {} = {}{}{}\n", name, with_deviation(p["value"], p["sd"]),
                  p["unit"] == "1" ? "" : " " + text(p["unit"]),
                  p["unit"] == "rad" ? fmt::format(" ({:.3g} deg)", degrees(value))

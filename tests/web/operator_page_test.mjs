@@ -1335,6 +1335,7 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
     result: {
       ...job.result,
       verdict: 'not_this_robot',
+      verdict_title: 'not this robot',
       checks: [
         {
           id: 'battery_current_reversed',
@@ -1411,6 +1412,7 @@ await check('no regions without a gap; zoom is in the address', async () => {
     result: {
       ...job.result,
       verdict: 'none',
+      verdict_title: 'no gap',
       effects: [],
       adoption: { ...job.result.adoption, effects: [] },
     },
@@ -1421,7 +1423,7 @@ await check('no regions without a gap; zoom is in the address', async () => {
   equal(await page.locator('.where, .adopt').count(), 0, 'regions and adoption');
   const [effect] = job.result.effects;
   const effects = [effect, { ...effect, id: 'brush_drop', probability: 0.4 }];
-  Object.assign(none.result, { verdict: 'inconclusive', effects });
+  Object.assign(none.result, { verdict: 'inconclusive', verdict_title: 'inconclusive', effects });
   await openAnew(page, diagnosis);
   const verdict = page.locator('.verdict-box .verdict');
   await verdict.getByText('most likely').waitFor();
