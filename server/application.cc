@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <future>
@@ -17,6 +16,7 @@
 #include "answers/json/autonomy_json.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
+#include "base/sleep.h"
 #include "base/try.h"
 #include "history/open_store.h"
 #include "history/spool.h"
@@ -177,7 +177,8 @@ struct Application::Parts {
     const bool by_path = options.store_url.empty();
     TRY_ASSIGN(server::ClusterOptions wanted, cluster_options(options));
     if (!wanted.name.empty()) in_cluster = std::move(wanted);
-    TRY_ASSIGN(auto options_of_store, store_options(options));
+    history::StoreOptions options_of_store = options.store;
+    options_of_store.query_limit = options.http.request_deadline;
     if (in_cluster) {
       options_of_store.shared_writer = in_cluster->writer;
       options_of_store.on_dropped = [this](const std::string& robot_id, history::Epoch epoch,
@@ -374,7 +375,6 @@ struct Application::Parts {
     server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
     server::export_attention_metrics(metrics, *attention);
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
-    if (store->standby()) server::export_standby_metrics(metrics, *store);
     server::export_process_metrics(metrics);
     server::export_robot_metrics(metrics, fleet, *watch, host_utime_us, options.robots_with_metrics);
   }
@@ -383,24 +383,25 @@ struct Application::Parts {
   static double positive(double value) { return value > 0 ? value : signals::unmeasured; }
 
   Result<void> start_http() {
-    services = std::make_unique<api::Services>(
-        api::Services{*store,
-                      *writer,
-                      models,
-                      fleet,
-                      recent,
-                      *forecasts,
-                      cost_tables,
-                      *drift_view,
-                      *adoption,
-                      *diagnoses,
-                      *watch,
-                      cluster.get(),
-                      host_utime_us,
-                      [this](const std::string& robot_id, const ingest::MissionRequest& request) {
-                        ingest->request_mission(robot_id, request);
-                      },
-                      {positive(options.price_per_kwh), options.currency, positive(options.co2_g_per_kwh)}});
+    services = std::make_unique<api::Services>(api::Services{
+        .store = *store,
+        .writer = *writer,
+        .models = models,
+        .fleet = fleet,
+        .recent = recent,
+        .forecasts = *forecasts,
+        .cost_tables = cost_tables,
+        .drift = *drift_view,
+        .adoption = *adoption,
+        .diagnoses = *diagnoses,
+        .watch = *watch,
+        .cluster = cluster.get(),
+        .now_utime_us = host_utime_us,
+        .request_mission =
+            [this](const std::string& robot_id, const ingest::MissionRequest& request) {
+              ingest->request_mission(robot_id, request);
+            },
+        .tariff = {positive(options.price_per_kwh), options.currency, positive(options.co2_g_per_kwh)}});
     attention = std::make_unique<api::AttentionList>(
         *services, is_own(), [](const Error& error) { log_error("attention", error); });
     services->attention = attention.get();
@@ -466,13 +467,8 @@ struct Application::Parts {
     });
     ended &= within(milliseconds(2000), [this] {
       if (ingest) ingest->stop();
-      {
-        const std::lock_guard lock(beat_mutex);
-        beating = false;
-      }
-      beat_wake.notify_all();
-      if (beat.joinable()) beat.join();
-      if (warming.joinable()) warming.join();
+      beat = {};
+      warming = {};
     });
     ended &= http_ended.get();
     if (writer) {
@@ -557,21 +553,17 @@ struct Application::Parts {
     tokens_read = read.has_value();
   }
 
-  void run_beat() {
+  void run_beat(const std::stop_token& stop) {
     server::FleetEvents fleet_events(fleet, recent, models, *forecasts, *store, events,
                                      [this](const history::Mission& mission, const std::string& json) {
                                        if (webhooks)
                                          webhooks->offer("mission", mission.robot_id, mission.end_utime_us,
                                                          json);
                                      });
-    std::unique_lock lock(beat_mutex);
-    while (beating) {
-      lock.unlock();
+    do {
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
       survive("tokens", [&] { read_tokens(); });
-      lock.lock();
-      beat_wake.wait_for(lock, milliseconds(1000), [&] { return !beating; });
-    }
+    } while (sleep_for(stop, milliseconds(1000)));
   }
 
   const DaemonOptions options;
@@ -608,11 +600,8 @@ struct Application::Parts {
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
   std::unique_ptr<http::HttpServer> http;
-  std::mutex beat_mutex;
-  std::condition_variable beat_wake;
-  bool beating = true;
   bool tokens_read = true;  // of the beat alone
-  std::thread beat, warming;
+  std::jthread beat, warming;
   std::atomic<bool> stopped = false;
   std::uint64_t last_receive = 0, last_account = 0, last_write = 0;
 };
@@ -629,8 +618,8 @@ Result<std::unique_ptr<Application>> Application::start(const DaemonOptions& opt
   TRY(parts->start_http());
   TRY(parts->join_cluster());
   TRY(parts->start_mqtt());
-  parts->beat = std::thread([&p = *parts] { p.run_beat(); });
-  parts->warming = std::thread([&p = *parts] { p.warm_forecasts(); });
+  parts->beat = std::jthread([&p = *parts](const std::stop_token& stop) { p.run_beat(stop); });
+  parts->warming = std::jthread([&p = *parts] { p.warm_forecasts(); });
   return std::unique_ptr<Application>(new Application(std::move(parts)));
 }
 

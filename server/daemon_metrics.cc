@@ -245,18 +245,6 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
   export_streams(metrics, events);
 }
 
-void export_standby_metrics(Metrics& metrics, const history::Store& store) {
-  using S = history::StandbyStatus;
-  metrics.rows<S>(
-      [&store] { return store.standby(); },
-      {{"joulecast_store_standby_in_use", "1 while the standby of store.read_url answers", &S::in_use},
-       {"joulecast_store_standby_staleness_seconds", "Replication delay of the standby; NaN: unknown",
-        [](const S& s) { return s.staleness_s.value_or(std::nan("")); }},
-       {"joulecast_store_standby_answers_total", "Queries answered by the standby", &S::answered},
-       {"joulecast_store_standby_passed_on_total",
-        "Queries answered by the server of store.url instead of the standby", &S::passed_on}});
-}
-
 void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
   using S = ClusterStatus;
   metrics.rows<S>(

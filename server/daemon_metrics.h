@@ -42,9 +42,6 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
                     const history::Writer& writer, StoreSizes& sizes, const http::EventHub& events,
                     std::function<std::int64_t()> now_utime_us);
 
-// Exports the metrics of the store's standby.
-void export_standby_metrics(Metrics& metrics, const history::Store& store);
-
 // joulecast_cluster_*: this daemon's part in its cluster.
 void export_cluster_metrics(Metrics& metrics, const Cluster& cluster);
 

@@ -46,17 +46,6 @@ std::string spool_path(const DaemonOptions& options) {
   return (history::is_postgres_url(url) ? options.store_path : history::sqlite_path(url)) + ".spool";
 }
 
-Result<history::StoreOptions> store_options(const DaemonOptions& options) {
-  history::StoreOptions store = options.store;
-  store.query_limit = options.http.request_deadline;
-  if (store.standby.url.empty()) return store;
-  if (!history::is_postgres_url(store.standby.url) || !history::is_postgres_url(store_url(options)))
-    return invalid("store.read_url", "must be the postgresql://... of a standby of the server of store.url");
-  if (Result<void> sound = history::check_store_url(store.standby.url); !sound)
-    return invalid("store.read_url", sound.error().message);
-  return store;
-}
-
 Result<server::ClusterOptions> cluster_options(const DaemonOptions& options) {
   constexpr std::size_t longest_name = 64;
   server::ClusterOptions cluster = options.cluster;
@@ -134,8 +123,6 @@ std::vector<Error> faults_of(const DaemonOptions& options) {
   if (options.http.tls.given()) check(http::check_tls(options.http.tls));
   if (const Result<void> sound = history::check_store_url(store_url(options)); !sound)
     faults.push_back({Fault::invalid, "store.url", sound.error().message});
-  else
-    check(store_options(options));
   check(cluster_options(options));
   check(ingest::SignatureGate(options.ingest.signatures).read_keys());
   check(telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from));

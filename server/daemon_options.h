@@ -65,9 +65,8 @@ std::string store_url(const DaemonOptions& options);
 // The spool, in the folder of the SQLite file; a local file also if the history is in a database server.
 std::string spool_path(const DaemonOptions& options);
 
-// The options of parts whose settings depend on each other. Fault::invalid on "store.read_url".
-Result<history::StoreOptions> store_options(const DaemonOptions& options);
-// Fault::invalid on "cluster.name" or "cluster.node". An empty name: no cluster.
+// The options of parts whose settings depend on each other. Fault::invalid on "cluster.name" or
+// "cluster.node". An empty name: no cluster.
 Result<server::ClusterOptions> cluster_options(const DaemonOptions& options);
 // Fault::invalid on "mqtt.url", "mqtt.client_id", "mqtt.interface", "mqtt.manufacturer" or
 // "mqtt.password_file".

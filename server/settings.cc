@@ -17,7 +17,6 @@ namespace joulecast {
 namespace {
 
 using http::number_text;
-using http::parse_number;
 
 const Setting* find_setting(std::string_view key) {
   for (const Setting& setting : settings_table()) {
@@ -61,7 +60,7 @@ std::optional<std::string> put(const Setting& setting, std::string_view value, c
   if (member.type == Type::integer || member.type == Type::number) {
     const bool whole = member.type == Type::integer;
     const auto number =
-        whole ? std::optional<double>(parse_number<std::int64_t>(value)) : parse_number<double>(value);
+        whole ? std::optional<double>(to_number<std::int64_t>(value)) : to_number<double>(value);
     if (!number) return (whole ? "must be an integer" : "must be a finite number") + shown;
     if (const Bounds bounds{setting.minimum, setting.maximum}; !bounds.contain(*number))
       return out_of_bounds(*number, bounds, setting.unit);
@@ -453,7 +452,7 @@ std::string settings_schema() {
     else if (type == Type::boolean)
       entry["default"] = value == "true";
     else {
-      entry["default"] = number(parse_number<double>(value).value());
+      entry["default"] = number(std::stod(value));
       entry["minimum"] = number(setting.minimum);
       entry["maximum"] = number(setting.maximum);
     }

@@ -121,11 +121,6 @@ constexpr Setting table[] = {
     {"store.url", MEMBER(store_url), 0, 0, "",
      "database of the history: sqlite:PATH or postgresql://user@host1,host2/database; empty: sqlite: and "
      "store.path"},
-    {"store.read_url", MEMBER(store.standby.url), 0, 0, "",
-     "standby of the PostgreSQL of store.url for queries of the history; answers contain the standby's "
-     "replication delay; empty: none"},
-    {"store.read_staleness_s", MEMBER(store.standby.max_staleness_s), 0.5, 3600, "s",
-     "replication delay of the standby beyond which the server of store.url is queried instead"},
     {"store.synchronous", [](DaemonOptions& o) { return choice(o.store.durability, store_synchronous); }, 0,
      0, "",
      "durability of a commit to the SQLite file: full survives a loss of power; normal, for slow disks, "

@@ -178,7 +178,9 @@ void judge_state(const nlohmann::json& state, const std::string& robot_id, Findi
   for (const auto& fault : state["faults"].items())
     add(std::ranges::find(harmless, fault.key()) == harmless.end(), "faults", fault_text(state, fault.key()));
   if (!state["has_model"].get<bool>())
-    add(true, "has_model", "the daemon has no model of this robot: its energy is not counted");
+    add(true, "has_model",
+        "the daemon has no robot file of this robot: its telemetry is counted, not recorded; add the file on "
+        "the page");
 }
 
 nlohmann::json to_json(const Findings& findings) {

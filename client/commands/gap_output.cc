@@ -217,8 +217,8 @@ void print_effect(const Json& e) {
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {
-      if (p["sd"].is_number() != estimated) continue;
       const double value = number_or_nan(p["value"]);
+      if (p["sd"].is_number() != estimated || (!estimated && value == 0 && name != "side")) continue;
       fmt::print("    {} = {}{}{}\n", name, with_deviation(p["value"], p["sd"]),
                  p["unit"] == "1" ? "" : " " + text(p["unit"]),
                  p["unit"] == "rad" ? fmt::format(" ({:.3g} deg)", degrees(value))
@@ -356,15 +356,10 @@ void print_diagnosis(const Json& d, const std::string& unit) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  fmt::print("verdict: {} (probability {})\n", gap::verdict_words(text(d["verdict"])),
+  fmt::print("verdict: {} (probability {})\n", text(d.value("verdict_title", d["verdict"])),
              gap::probability_text(number_or_nan(d["verdict_probability"])));
   for (const Json& reason : member_at(d, "reasons")) print_item(text(reason));
   for (const Json& e : d["effects"]) print_effect(e);
-  if (!text(d["outside"]["channel"]).empty()) {
-    fmt::print("  outside the catalogue: {} follows {} (probability {})\n", text(d["outside"]["channel"]),
-               text(d["outside"]["follows"]),
-               gap::probability_text(number_or_nan(d["outside"]["probability"])));
-  }
   print_held_out(d);
   print_terms(d);
   print_corrections(d);

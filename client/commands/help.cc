@@ -131,7 +131,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
     const std::string kind = option == nullptr ? "" : value_name(*option);
     const std::size_t equals = text.find(" = ");
     if (!kind.empty())
-      text = name + (kind.front() == 'I' ? " takes an " : " takes a ") + kind +
+      text = name + " requires " + kind +
              (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
   }
   return fmt::format("{}: {}\n{} --help lists the valid arguments\n", command, text, command);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/fault_boundary.h"
+#include "base/sleep.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "describe/input.h"
@@ -96,8 +97,8 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
     reasons.push_back({"no_robot_file",
                        Severity::warning,
                        {},
-                       "Telemetry of a robot without a robot file is not recorded.",
-                       "Add its robot file."});
+                       "It has no robot file: its telemetry is counted, not recorded.",
+                       "Add its robot file on its page."});
   if (live && model != nullptr && !battery::at_charger(s.charge.phase) &&
       s.state_of_charge < model->robot.battery.reserve_fraction)  // false for NaN
     reasons.push_back({"charge_low",
@@ -352,30 +353,12 @@ AttentionList::AttentionList(const Services& services, std::function<bool(const 
                              std::function<void(const Error&)> on_error)
     : services_(services), is_own_(std::move(is_own)), on_error_(std::move(on_error)) {}
 
-AttentionList::~AttentionList() {
-  stop();
-}
-
 void AttentionList::start() {
-  running_ = true;
-  thread_ = std::thread([this] {
-    std::unique_lock lock(mutex_);
-    while (running_) {
-      lock.unlock();
+  thread_ = std::jthread([this](const std::stop_token& stop) {
+    do {
       survive("attention", [this] { look(); });
-      lock.lock();
-      wake_.wait_for(lock, std::chrono::seconds(1), [this] { return !running_; });
-    }
+    } while (sleep_for(stop, std::chrono::seconds(1)));
   });
-}
-
-void AttentionList::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    running_ = false;
-  }
-  wake_.notify_all();
-  if (thread_.joinable()) thread_.join();
 }
 
 std::vector<AttentionEntry> AttentionList::entries() const {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -61,13 +60,12 @@ class AttentionList {
   // `is_own`: see WatchOptions. The list outlives no member of `services`.
   AttentionList(const Services& services, std::function<bool(const std::string& robot_id)> is_own,
                 std::function<void(const Error&)> on_error);
-  ~AttentionList();
   AttentionList(const AttentionList&) = delete;
   AttentionList& operator=(const AttentionList&) = delete;
 
   // Looks once a second, in a thread of its own, until stop().
   void start();
-  void stop();
+  void stop() { thread_ = {}; }
 
   // Unacknowledged ones first, then the most urgent, then by robot id.
   std::vector<AttentionEntry> entries() const;
@@ -95,10 +93,8 @@ class AttentionList {
   std::optional<std::chrono::steady_clock::time_point> read_at_;
   std::mutex changing_;  // held while what is stored changes
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
   Reasons shown_;
-  bool running_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace joulecast::api

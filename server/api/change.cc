@@ -106,7 +106,7 @@ Result<std::optional<Response>> IdempotencyKeys::known(const Request& request) c
 // Requests that change something are handled one by one (Run::write), so that another one of the same key can
 // only be another daemon's.
 Result<Response> IdempotencyKeys::answer(const Request& request, const http::Handler& handler) const {
-  request.kept.idempotency_key = http::trim(request.header(http::idempotency_header));
+  request.kept.idempotency_key = trimmed(request.header(http::idempotency_header));
   if (request.kept.idempotency_key.empty()) return handler(request);
   if (!is_valid(request.kept.idempotency_key)) {
     const std::string form =

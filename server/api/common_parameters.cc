@@ -1,9 +1,9 @@
 #include "server/api/common_parameters.h"
 
-#include <charconv>
 #include <iterator>
 #include <utility>
 
+#include "base/text.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "server/http/json_digits.h"
@@ -15,12 +15,11 @@ using http::Parameter;
 
 Result<std::int64_t> path_id(const http::Request& request, std::string_view thing, const std::string& name) {
   const std::string& text = request.param(name);
-  std::int64_t id = 0;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (fault != std::errc() || end != text.data() + text.size() || id <= 0)
+  const auto id = to_number<std::int64_t>(text);
+  if (!id || *id <= 0)
     return fail(Fault::not_found, name,
                 "\"" + text + "\" names no " + std::string(thing) + ": ids are positive integers");
-  return id;
+  return *id;
 }
 
 Parameter digits_parameter() {
@@ -48,10 +47,8 @@ Parameter cursor_parameter() {
 Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
   const auto text = request.query_value("cursor");
   if (!text) return std::nullopt;
-  std::int64_t id = 0;
-  const auto [end, fault] = std::from_chars(text->data(), text->data() + text->size(), id);
-  if (fault != std::errc() || end != text->data() + text->size() || id < 0)
-    return invalid("cursor", "must be the next_cursor of a page of this list");
+  const auto id = to_number<std::int64_t>(*text);
+  if (!id || *id < 0) return invalid("cursor", "must be the next_cursor of a page of this list");
   return id;
 }
 

@@ -149,12 +149,10 @@ Response list_missions_csv(const Request& request, const history::MissionPage& p
 
 Result<Response> list_missions(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
-  const history::Past past = past_of(services, request);
   TRY_ASSIGN(history::MissionPage found,
-             past.history.missions(filter, page_of(request, 50), sort_of(request)));
-  if (request.csv) return told_staleness(list_missions_csv(request, found), past);
-  return told_staleness(
-      page_response("missions", found.missions, answers::mission_table(), found.next_cursor), past);
+             services.store.missions(filter, page_of(request, 50), sort_of(request)));
+  if (request.csv) return list_missions_csv(request, found);
+  return page_response("missions", found.missions, answers::mission_table(), found.next_cursor);
 }
 
 // Missions that are summed together.
@@ -165,9 +163,8 @@ struct Group {
 };
 
 // Robots of one kind together; those without a model are one more kind.
-Result<std::vector<Group>> groups_by_kind(const Services& services, const history::History& history,
-                                          history::MissionFilter filter) {
-  TRY_ASSIGN(const auto robots, history.grouped_totals(filter, history::Grouping::robot, 0));
+Result<std::vector<Group>> groups_by_kind(const Services& services, history::MissionFilter filter) {
+  TRY_ASSIGN(const auto robots, services.store.grouped_totals(filter, history::Grouping::robot, 0));
   std::map<std::string, std::vector<std::string>> ids_of;
   for (const history::TotalsGroup& each : robots) {
     const auto model = services.models.find(each.robot_id);
@@ -176,7 +173,7 @@ Result<std::vector<Group>> groups_by_kind(const Services& services, const histor
   std::vector<Group> groups;
   for (auto& [kind, ids] : ids_of) {
     filter.robot_ids = ids;
-    TRY_ASSIGN(const history::Totals totals, history.totals(filter));
+    TRY_ASSIGN(const history::Totals totals, services.store.totals(filter));
     groups.push_back({std::move(ids), std::nullopt, std::nullopt, totals});
   }
   return groups;
@@ -200,13 +197,13 @@ std::vector<std::string> grouping_names() {
   return names;
 }
 
-Result<std::vector<Group>> groups_of(const Services& services, const history::History& history,
-                                     const Request& request, const history::MissionFilter& filter) {
+Result<std::vector<Group>> groups_of(const Services& services, const Request& request,
+                                     const history::MissionFilter& filter) {
   const auto by = request.query_value("group_by");
   if (!by) return std::vector<Group>{};
   const Grouped& as = *std::ranges::find(groupings, *by, &Grouped::name);
-  if (!as.by) return groups_by_kind(services, history, filter);
-  TRY_ASSIGN(const auto found, history.grouped_totals(
+  if (!as.by) return groups_by_kind(services, filter);
+  TRY_ASSIGN(const auto found, services.store.grouped_totals(
                                    filter, *as.by, 60 * request.query_integer("utc_offset_min").value_or(0)));
   std::vector<Group> groups;
   for (const history::TotalsGroup& each : found) {
@@ -281,15 +278,12 @@ Response totals_csv(const Request& request, const std::vector<Group>& groups) {
 
 Result<Response> totals(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
-  const history::Past past = past_of(services, request);
-  TRY_ASSIGN(history::Totals all, past.history.totals(filter));
-  TRY_ASSIGN(const std::vector<Group> groups, groups_of(services, past.history, request, filter));
+  TRY_ASSIGN(history::Totals all, services.store.totals(filter));
+  TRY_ASSIGN(const std::vector<Group> groups, groups_of(services, request, filter));
   const bool grouped = request.query_value("group_by").has_value();
-  if (request.csv)
-    return told_staleness(totals_csv(request, grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}),
-                          past);
+  if (request.csv) return totals_csv(request, grouped ? groups : std::vector<Group>{{{}, {}, {}, all}});
   const TotalsAnswer answer{all, grouped ? std::optional(groups) : std::nullopt};
-  return told_staleness(http::json_response(totals_answer_table().text(answer)), past);
+  return http::json_response(totals_answer_table().text(answer));
 }
 
 const Table<Tariff>& tariff_table() {

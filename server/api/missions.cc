@@ -259,11 +259,10 @@ const Table<TraceAnswer>& trace_table() {
 
 Result<Response> trace(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
-  const history::Past past = past_of(services, request);
   TRY_ASSIGN(const auto found,
-             past.history.trace(span.key, span.range, request.query_integer("points").value_or(1000)));
-  if (request.csv) return told_staleness(trace_csv(request, found, span.key), past);
-  return told_staleness(http::json_response(trace_table().text({span.key, found})), past);
+             services.store.trace(span.key, span.range, request.query_integer("points").value_or(1000)));
+  if (request.csv) return trace_csv(request, found, span.key);
+  return http::json_response(trace_table().text({span.key, found}));
 }
 
 struct TelemetryAnswer {
@@ -338,10 +337,9 @@ const Table<TelemetryAnswer>& telemetry_table() {
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
-  const history::Past past = past_of(services, request);
-  TRY_ASSIGN(const auto found, past.history.telemetry(span.key, span.range, page_of(request, 1000)));
-  if (request.csv) return told_staleness(telemetry_csv(request, found, span.key), past);
-  return told_staleness(http::json_response(telemetry_table().text({span.key, found})), past);
+  TRY_ASSIGN(const auto found, services.store.telemetry(span.key, span.range, page_of(request, 1000)));
+  if (request.csv) return telemetry_csv(request, found, span.key);
+  return http::json_response(telemetry_table().text({span.key, found}));
 }
 
 struct CovariatesAnswer {
@@ -369,10 +367,9 @@ const Table<CovariatesAnswer>& covariates_table() {
 
 Result<Response> covariates(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
-  const history::Past past = past_of(services, request);
-  TRY_ASSIGN(const auto found, past.history.covariates(span.key, span.range, page_of(request, 1000)));
-  if (request.csv) return told_staleness(covariates_csv(request, found, span.key), past);
-  return told_staleness(http::json_response(covariates_table().text({span.key, found})), past);
+  TRY_ASSIGN(const auto found, services.store.covariates(span.key, span.range, page_of(request, 1000)));
+  if (request.csv) return covariates_csv(request, found, span.key);
+  return http::json_response(covariates_table().text({span.key, found}));
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <string>
 
 #include "answers/json/drive_json.h"
 #include "answers/json/mission_json.h"

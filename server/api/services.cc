@@ -1,10 +1,7 @@
 #include "server/api/services.h"
 
-#include <array>
-#include <charconv>
 #include <iterator>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -93,21 +90,6 @@ described::Schemas schemas() {
     add(schemas_of());
   for (const auto& [tag, part] : parts) add(part().schemas);
   return all;
-}
-
-history::Past past_of(const Services& services, const http::Request& request) {
-  const bool newest = request.header("cache-control").find("no-cache") != std::string_view::npos;
-  return newest ? history::Past{services.store, std::nullopt} : services.store.past();
-}
-
-http::Response told_staleness(http::Response response, const history::Past& past) {
-  if (past.staleness_s) {
-    std::array<char, 32> text{};
-    const auto end =
-        std::to_chars(text.data(), text.data() + text.size(), *past.staleness_s, std::chars_format::fixed, 3);
-    response.headers.emplace_back("Joulecast-Staleness", std::string(text.data(), end.ptr));
-  }
-  return response;
 }
 
 }  // namespace joulecast::api

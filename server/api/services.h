@@ -118,11 +118,4 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
                                                              const std::string& robot_id,
                                                              std::string field = "id");
 
-// Source of a request's queries of the history: the standby if one is configured; the primary, which has
-// every commit, for requests with Cache-Control: no-cache.
-history::Past past_of(const Services& services, const http::Request& request);
-// `response` with the header Joulecast-Staleness, the replication delay in seconds; absent if the source is
-// complete.
-http::Response told_staleness(http::Response response, const history::Past& past);
-
 }  // namespace joulecast::api

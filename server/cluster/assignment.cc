@@ -5,18 +5,15 @@
 #include <set>
 #include <utility>
 
+#include "base/text.h"
+
 namespace joulecast::server {
 namespace {
 
 // FNV-1a of both names, mixed by the finalizer of MurmurHash3: the same in every build and on every machine.
 std::uint64_t weight(std::string_view node, std::string_view robot_id) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  const auto take = [&hash](std::string_view text) {
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-    hash = (hash ^ 0xff) * 1099511628211ULL;
-  };
-  take(node);
-  take(robot_id);
+  constexpr std::string_view end = "\xff";
+  std::uint64_t hash = fnv1a(end, fnv1a(robot_id, fnv1a(end, fnv1a(node))));
   hash = (hash ^ hash >> 33) * 0xff51afd7ed558ccdULL;
   hash = (hash ^ hash >> 33) * 0xc4ceb9fe1a85ec53ULL;
   return hash ^ hash >> 33;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/fault_boundary.h"
+#include "base/sleep.h"
 #include "base/try.h"
 #include "ingest/snapshot_bytes.h"
 #include "robot/robot_file.h"
@@ -169,28 +170,24 @@ Result<void> Cluster::start(const std::string& address) {
   {
     const std::lock_guard lock(mutex_);
     renewed_ = steady_since_ = Clock::now();
-    running_ = true;
   }
-  keeper_ = std::thread([this] { keep(); });
-  exchanger_ = std::thread([this] { exchange(); });
+  keeper_ = std::jthread([this](const std::stop_token& stop) { keep(stop); });
+  exchanger_ = std::jthread([this](const std::stop_token& stop) { exchange(stop); });
   return {};
 }
 
 void Cluster::settle_down() {
   std::unique_lock lock(mutex_);
   settling_ = true;
-  wake_.wait_for(lock, settling_patience, [this] { return settled_ || !running_; });
+  if (keeper_.joinable()) settles_.wait_for(lock, settling_patience, [this] { return settled_; });
   settled_ = true;
 }
 
 void Cluster::leave() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!std::exchange(running_, false)) return;
-  }
-  wake_.notify_all();
-  keeper_.join();
-  exchanger_.join();
+  if (!keeper_.joinable()) return;
+  for (std::jthread* thread : {&keeper_, &exchanger_}) thread->request_stop();
+  keeper_ = {};
+  exchanger_ = {};
   if (const Result<void> left = leases_->leave(); !left)
     parts_.note("the cluster was not notified that this daemon leaves: " + describe(left.error()));
 }
@@ -226,14 +223,8 @@ void Cluster::on_dropped(const std::string& robot_id, history::Epoch epoch, std:
               " were dropped: another daemon keeps it since");
 }
 
-bool Cluster::wait(milliseconds period) {
-  std::unique_lock lock(mutex_);
-  wake_.wait_for(lock, period, [this] { return !running_; });
-  return running_;
-}
-
-void Cluster::keep() {
-  for (bool again = true; again || wait(turn_period);) {
+void Cluster::keep(const std::stop_token& stop) {
+  for (bool again = true; again || sleep_for(stop, turn_period);) {
     again = false;
     survive("cluster leases", [&] {
       const Result<bool> turned = turn();
@@ -278,7 +269,7 @@ Result<bool> Cluster::turn() {
     const std::lock_guard lock(mutex_);
     if (settling_) {
       settled_ = taken == 0 && gone_since_.empty();
-      wake_.notify_all();
+      settles_.notify_all();
       return taken > 0;
     }
   }
@@ -414,7 +405,7 @@ Result<void> Cluster::take_jobs() {
   return {};
 }
 
-void Cluster::exchange() {
+void Cluster::exchange(const std::stop_token& stop) {
   Exchange exchange(options_.node,
                     std::make_unique<history::SharedState>(options_.url, options_.writer + "-exchange"),
                     parts_);
@@ -426,7 +417,7 @@ void Cluster::exchange() {
         parts_.note("live states are not exchanged with the other daemons: " + describe(turned.error()));
       reported = !turned;
     });
-  } while (wait(exchange_period));
+  } while (sleep_for(stop, exchange_period));
 }
 
 }  // namespace joulecast::server

@@ -93,8 +93,7 @@ class Cluster {
     Clock::time_point since;
   };
 
-  bool wait(std::chrono::milliseconds period);
-  void keep();
+  void keep(const std::stop_token& stop);
   void note(const Result<void>& done);
   Result<bool> turn();
   Result<void> renew();
@@ -106,15 +105,15 @@ class Cluster {
   bool keeps(const history::Lease& lease);
   void count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken);
   Result<void> take_jobs();
-  void exchange();
+  void exchange(const std::stop_token& stop);
 
   const ClusterOptions options_;
   const Parts parts_;
   std::unique_ptr<history::Leases> leases_;
 
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  bool running_ = false, settling_ = false, settled_ = false;
+  std::condition_variable settles_;
+  bool settling_ = false, settled_ = false;
   ClusterStatus status_;
   std::optional<Clock::time_point> read_, renewed_, steady_since_;
   std::optional<Clock::time_point> reported_dropped_;
@@ -125,7 +124,7 @@ class Cluster {
   Clock::time_point looked_for_jobs_{};
   std::map<std::string, Release> letting_go_;  // the last of each robot
 
-  std::thread keeper_, exchanger_;
+  std::jthread keeper_, exchanger_;
 };
 
 }  // namespace joulecast::server

@@ -60,6 +60,7 @@ Json summary_of(const ordered_json& result) {
                        {"share", effect["share"]},
                        {"alternatives", effect["alternatives"]}});
   return {{"verdict", result["verdict"]},
+          {"verdict_title", result["verdict_title"]},
           {"gap", result["gap"]},
           {"effects", effects},
           {"shrinkage", result["shrinkage"]}};
@@ -134,17 +135,16 @@ DiagnosisService::~DiagnosisService() {
 
 Result<void> DiagnosisService::start() {
   TRY(writer_.execute(history::InterruptDiagnoses{now_utime_us_()}));
-  thread_ = std::thread([this] { work(); });
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
   return {};
 }
 
 void DiagnosisService::stop() {
   {
     const std::lock_guard lock(mutex_);
-    stopping_ = true;
+    thread_.request_stop();
     if (running_) running_->cancelled = true;
   }
-  wake_.notify_all();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -173,7 +173,7 @@ Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, c
   std::size_t ahead = 0;
   {
     const std::lock_guard lock(mutex_);
-    if (stopping_) return fail(Fault::unavailable, "", "the service is stopping");
+    if (stopping()) return fail(Fault::unavailable, "", "the service is stopping");
     if (waiting_.size() >= options_.queue)
       return fail(Fault::unavailable, "",
                   std::to_string(waiting_.size()) + " diagnoses are waiting; try again later");
@@ -201,7 +201,7 @@ Result<void> DiagnosisService::take_over(std::int64_t id) {
   job->record.held_back.clear();
   {
     const std::lock_guard lock(mutex_);
-    if (stopping_) return fail(Fault::unavailable, "", "the service is stopping");
+    if (stopping()) return fail(Fault::unavailable, "", "the service is stopping");
     waiting_.push_back(std::move(job));
   }
   wake_.notify_all();
@@ -284,14 +284,14 @@ Result<void> DiagnosisService::any_ended(const DiagnosisRequest& request) const 
                   (request.since_utime_us ? " from then on" : "") + " that has ended: nothing to diagnose");
 }
 
-void DiagnosisService::work() {
+void DiagnosisService::work(const std::stop_token& stop) {
   setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), low_priority);
   for (;;) {
     std::shared_ptr<Job> job;
     {
       std::unique_lock lock(mutex_);
-      wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
-      if (stopping_) return;  // the next start marks waiting jobs as interrupted
+      wake_.wait(lock, stop, [this] { return !waiting_.empty(); });
+      if (stop.stop_requested()) return;  // the next start marks waiting jobs as interrupted
       job = waiting_.front();
       job->started_utime_us = now_utime_us_();
       running_ = job;
@@ -316,12 +316,8 @@ void DiagnosisService::run(Job& job) {
   if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, {}}); !stored)
     on_error_(stored.error());
   const Result<void> judged = judge(job);
-  const bool stopping = [&] {
-    const std::lock_guard lock(mutex_);
-    return stopping_;
-  }();
   if (judged) return finish(job, DiagnosisState::done, {}, std::move(report_));
-  if (job.cancelled && stopping)
+  if (job.cancelled && stopping())
     return finish(job, DiagnosisState::interrupted, "the service stopped before it was done", {});
   if (job.cancelled) return finish(job, DiagnosisState::cancelled, "cancelled", {});
   finish(job, DiagnosisState::failed, judged.error().message, {});

@@ -94,9 +94,10 @@ class DiagnosisService {
 
  private:
   struct Job;
+  bool stopping() const { return thread_.get_stop_token().stop_requested(); }
   // Whether the robot has a mission that a diagnosis could read.
   Result<void> any_ended(const DiagnosisRequest& request) const;
-  void work();
+  void work(const std::stop_token& stop);
   void run(Job& job);
   Result<void> judge(Job& job);
   void end_record(history::DiagnosisRecord& record, history::DiagnosisState state, std::string error) const;
@@ -114,12 +115,11 @@ class DiagnosisService {
   std::string report_;     // of the job that runs, as HTML
   std::mutex submitting_;  // between looking at the queue and entering it
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable_any wake_;
   std::deque<std::shared_ptr<Job>> waiting_;
   std::shared_ptr<Job> running_;
   DiagnosisCounts counts_;
-  bool stopping_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace joulecast::server

@@ -226,9 +226,12 @@ Result<void> GapWatch::announce_drift(const std::string& robot_id, const drift::
 void GapWatch::on_diagnosis(const history::DiagnosisRecord& diagnosis) {
   if (diagnosis.cause != history::DiagnosisCause::watch || diagnosis.state != history::DiagnosisState::done)
     return;
-  const Json result = Json::parse(diagnosis.result_json, nullptr, false);
+  Json result = Json::parse(diagnosis.result_json, nullptr, false);
   if (!result.is_object()) return;
-  Json detail = {{"diagnosis_id", diagnosis.id}, {"verdict", result["verdict"]}, {"gap", result["gap"]}};
+  Json detail = {{"diagnosis_id", diagnosis.id},
+                 {"verdict", result["verdict"]},
+                 {"verdict_title", result["verdict_title"]},
+                 {"gap", result["gap"]}};
   std::map<std::string, double> by_cause;
   detail["effects"] = Json::array();
   for (const Json& effect : result["effects"]) {

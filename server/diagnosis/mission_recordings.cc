@@ -12,9 +12,9 @@ namespace {
 // All pages of a query of a mission's recording.
 template <class Page, class Item>
 Result<std::vector<Item>> all_of(const history::Store& store, history::MissionKey key,
-                                 Result<Page> (history::History::*query)(history::MissionKey,
-                                                                         history::TimeRange,
-                                                                         const history::PageRequest&) const,
+                                 Result<Page> (history::Store::*query)(history::MissionKey,
+                                                                       history::TimeRange,
+                                                                       const history::PageRequest&) const,
                                  std::vector<Item> Page::*items) {
   history::PageRequest page{history::max_telemetry_samples, {}};
   std::vector<Item> all;

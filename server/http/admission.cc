@@ -60,7 +60,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   const auto value_of = [&](bhttp::field name) { return view(head[name]); };
   if (count(bhttp::field::transfer_encoding) > 0 &&
       (count(bhttp::field::transfer_encoding) > 1 || head.version() < 11 ||
-       !equals_ignoring_case(trim(value_of(bhttp::field::transfer_encoding)), "chunked")))
+       !equals_ignoring_case(trimmed(value_of(bhttp::field::transfer_encoding)), "chunked")))
     return malformed("Transfer-Encoding must be exactly chunked, once, in HTTP/1.1");
   // A repeated or listed length is allowed by the RFC where all agree; others may read it otherwise.
   if (count(bhttp::field::content_length) > 1 ||
@@ -72,7 +72,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   if (count(bhttp::field::authorization) > 1) return malformed("Authorization must be present once at most");
   const auto [expect, last] = head.equal_range(bhttp::field::expect);
   if (head.version() >= 11 && std::any_of(expect, last, [](const auto& field) {
-        return !equals_ignoring_case(trim(view(field.value())), "100-continue");
+        return !equals_ignoring_case(trimmed(view(field.value())), "100-continue");
       }))
     return Denial{Refusal::malformed, 417, "expectation-failed",
                   "Only the expectation 100-continue is supported here"};
@@ -135,7 +135,7 @@ net::ip::address TrustedProxies::client_of(net::ip::address connection, const Re
       comma = line.rfind(',');
       const std::size_t begin = comma == std::string_view::npos ? 0 : comma + 1;
       boost::system::error_code error;
-      const auto address = net::ip::make_address(std::string(trim(line.substr(begin))), error);
+      const auto address = net::ip::make_address(std::string(trimmed(line.substr(begin))), error);
       if (error) return client;
       client = unmapped(address);
       if (!contains(client)) return client;

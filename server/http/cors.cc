@@ -29,10 +29,9 @@ void Cors::add_headers(const Request& request, Response& response) const {
         "X-Request-Id");
     response.headers.emplace_back("Access-Control-Max-Age", preflight_age_s);
   } else {
-    response.headers.emplace_back(
-        "Access-Control-Expose-Headers",
-        "Deprecation, ETag, Idempotency-Replayed, Joulecast-Staleness, Link, Location, Retry-After, "
-        "WWW-Authenticate, X-Request-Id");
+    response.headers.emplace_back("Access-Control-Expose-Headers",
+                                  "Deprecation, ETag, Idempotency-Replayed, Link, Location, Retry-After, "
+                                  "WWW-Authenticate, X-Request-Id");
   }
 }
 

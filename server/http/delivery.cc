@@ -1,6 +1,7 @@
 #include "server/http/delivery.h"
 
-#include <charconv>
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "server/http/content_coding.h"
@@ -53,13 +54,7 @@ void code(const Request& request, Response& response) {
 }  // namespace
 
 std::string entity_tag(std::string_view bytes) {
-  // FNV-1a, 64 bits: distinguishes versions; nothing here relies on it against an adversary.
-  std::uint64_t hash = 14695981039346656037ULL;
-  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-  char text[20];
-  const auto [end, fault] = std::to_chars(text, text + sizeof text, hash, 16);
-  (void)fault;  // 16 hexadecimal digits at most
-  return "W/\"" + std::string(text, end) + "\"";
+  return fmt::format("W/\"{:x}\"", fnv1a(bytes));
 }
 
 void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io) {

@@ -205,7 +205,7 @@ Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_
     const auto dash = last_event_id.rfind('-');
     std::optional<std::uint64_t> number;
     if (dash != std::string_view::npos && last_event_id.substr(0, dash) == epoch_)
-      number = parse_number<std::uint64_t>(last_event_id.substr(dash + 1));
+      number = to_number<std::uint64_t>(last_event_id.substr(dash + 1));
     const std::uint64_t oldest = backlog_.empty() ? next_number_ : backlog_.front()->number;
     if (number && *number + 1 >= oldest && *number < next_number_) {
       for (const auto& event : backlog_)

@@ -33,7 +33,7 @@ constexpr std::string_view robot_path = "/v1/robots/{id}";
 // The value of a cookie of that name, or empty.
 std::string_view cookie_value(std::string_view header, std::string_view name) {
   while (!header.empty()) {
-    std::string_view pair = trim(take_item(header, ';'));
+    std::string_view pair = trimmed(take_item(header, ';'));
     if (pair.size() > name.size() && take_item(pair, '=') == name) return pair;
   }
   return {};
@@ -205,7 +205,7 @@ void Gate::record_refusal(const Endpoint& endpoint, const Request& request, unsi
 // The token that a request proves to have; null: none that is valid. With the mutex held.
 const Token* Gate::token_of(const Request& request, bool& presented) {
   const std::int64_t now = options_.now_utime_us();
-  const std::string_view authorization = trim(request.header("authorization"));
+  const std::string_view authorization = trimmed(request.header("authorization"));
   const Token* token = nullptr;
   if (!authorization.empty()) {
     presented = true;
@@ -213,7 +213,7 @@ const Token* Gate::token_of(const Request& request, bool& presented) {
     if (authorization.size() <= scheme.size() || authorization.size() > longest_text ||
         !equals_ignoring_case(authorization.substr(0, scheme.size()), scheme))
       return nullptr;
-    token = access::find_token(tokens_, trim(authorization.substr(scheme.size())));
+    token = access::find_token(tokens_, trimmed(authorization.substr(scheme.size())));
   } else if (const auto value = cookie_value(request.header("cookie"), session_cookie); !value.empty()) {
     presented = true;
     const auto session = sessions_.find(access::sha256_hex(value));

@@ -8,7 +8,6 @@
 #include <mutex>
 #include <thread>
 #include <tuple>
-#include <vector>
 
 #include "access/sha256.h"
 #include "base/host_clock.h"

@@ -1,9 +1,6 @@
 #include "server/http/message.h"
 
 #include <algorithm>
-#include <atomic>
-#include <cassert>
-#include <charconv>
 #include <cstdlib>
 #include <functional>
 
@@ -40,12 +37,12 @@ std::optional<std::string_view> Request::query_value(std::string_view name) cons
 
 std::optional<double> Request::query_number(std::string_view name) const {
   const auto text = query_value(name);
-  return text ? parse_number<double>(*text) : std::nullopt;
+  return text ? to_number<double>(*text) : std::nullopt;
 }
 
 std::optional<std::int64_t> Request::query_integer(std::string_view name) const {
   const auto text = query_value(name);
-  return text ? parse_number<std::int64_t>(*text) : std::nullopt;
+  return text ? to_number<std::int64_t>(*text) : std::nullopt;
 }
 
 std::optional<bool> Request::query_boolean(std::string_view name) const {

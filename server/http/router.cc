@@ -25,17 +25,17 @@ namespace {
 
 // RFC 9110 section 12.5.1 without weights other than q=0, which excludes a range.
 bool accepts(std::string_view accept, std::string_view type) {
-  if (trim(accept).empty()) return true;
-  const auto base = trim(type.substr(0, type.find(';')));
+  if (trimmed(accept).empty()) return true;
+  const auto base = trimmed(type.substr(0, type.find(';')));
   const auto major = base.substr(0, base.find('/'));
   int best = -1;  // specificity of the range that decides
   bool allowed = false;
   while (!accept.empty()) {
     std::string_view item = take_item(accept, ',');
-    const auto range = trim(take_item(item, ';'));
+    const auto range = trimmed(take_item(item, ';'));
     bool zero = false;
     while (!item.empty()) {
-      const auto part = trim(take_item(item, ';'));
+      const auto part = trimmed(take_item(item, ';'));
       if (part.size() > 2 && lower(part[0]) == 'q' && part[1] == '=')
         zero = part.find_first_not_of("0.", 2) == std::string_view::npos;
     }
@@ -59,7 +59,7 @@ bool accepts(std::string_view accept, std::string_view type) {
 bool asks_for_csv(std::string_view accept) {
   while (!accept.empty()) {
     const auto item = take_item(accept, ',');
-    const auto range = trim(item.substr(0, item.find(';')));
+    const auto range = trimmed(item.substr(0, item.find(';')));
     if (equals_ignoring_case(range, "application/json")) return false;
     if (equals_ignoring_case(range, "text/csv")) return accepts(item, "text/csv");
   }
@@ -67,7 +67,7 @@ bool asks_for_csv(std::string_view accept) {
 }
 
 bool is_json_type(std::string_view type) {
-  const auto base = trim(type.substr(0, type.find(';')));
+  const auto base = trimmed(type.substr(0, type.find(';')));
   return equals_ignoring_case(base, "application/json") ||
          (base.size() > 17 && equals_ignoring_case(base.substr(0, 12), "application/") &&
           equals_ignoring_case(base.substr(base.size() - 5), "+json"));
@@ -89,7 +89,7 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
     case Parameter::Type::number: {
       const bool whole = parameter.type == Parameter::Type::integer;
       const auto value =
-          whole ? std::optional<double>(parse_number<std::int64_t>(text)) : parse_number<double>(text);
+          whole ? std::optional<double>(to_number<std::int64_t>(text)) : to_number<double>(text);
       if (!value) return whole ? "must be an integer" : "must be a finite number";
       const Bounds none,
           bounds{parameter.minimum.value_or(none.minimum), parameter.maximum.value_or(none.maximum)};
@@ -242,7 +242,7 @@ Router::Match Router::match(Request& request) const {
     if (!is_json_type(request.header("content-type")))
       return refused(415, "unsupported-media-type", "The body must be of type application/json",
                      "Content-Type", "must be application/json");
-    const auto coding = trim(request.header("content-encoding"));
+    const auto coding = trimmed(request.header("content-encoding"));
     if (!coding.empty() && !equals_ignoring_case(coding, "identity"))
       return refused(415, "unsupported-media-type", "The body must not be compressed", "Content-Encoding",
                      "must be identity");

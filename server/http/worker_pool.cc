@@ -6,16 +6,8 @@
 namespace joulecast::http {
 
 WorkerPool::WorkerPool(unsigned threads, std::size_t capacity) : capacity_(capacity) {
-  for (unsigned i = 0; i < std::max(threads, 1U); ++i) threads_.emplace_back([this] { work(); });
-}
-
-WorkerPool::~WorkerPool() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  filled_.notify_all();
-  for (auto& thread : threads_) thread.join();
+  for (unsigned i = 0; i < std::max(threads, 1U); ++i)
+    threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
 }
 
 bool WorkerPool::submit(std::function<void()> task, bool admitted) {
@@ -28,11 +20,10 @@ bool WorkerPool::submit(std::function<void()> task, bool admitted) {
   return true;
 }
 
-void WorkerPool::work() {
+void WorkerPool::work(const std::stop_token& stop) {
   for (;;) {
     std::unique_lock lock(mutex_);
-    filled_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
-    if (queue_.empty()) return;
+    if (!filled_.wait(lock, stop, [this] { return !queue_.empty(); })) return;
     auto task = std::move(queue_.front());
     queue_.pop_front();
     lock.unlock();

@@ -14,7 +14,7 @@ namespace joulecast::http {
 class WorkerPool {
  public:
   WorkerPool(unsigned threads, std::size_t capacity);
-  ~WorkerPool();  // runs queued tasks, then joins
+  ~WorkerPool() = default;  // runs queued tasks, then joins
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
@@ -23,14 +23,13 @@ class WorkerPool {
   bool submit(std::function<void()> task, bool admitted = false);
 
  private:
-  void work();
+  void work(const std::stop_token& stop);
 
   std::mutex mutex_;
-  std::condition_variable filled_;
+  std::condition_variable_any filled_;
   std::deque<std::function<void()>> queue_;
   std::size_t capacity_;
-  bool stopping_ = false;
-  std::vector<std::thread> threads_;
+  std::vector<std::jthread> threads_;
 };
 
 }  // namespace joulecast::http

@@ -89,18 +89,13 @@ std::string BatteryTopics::connection_message(const std::string& state) {
 
 Result<void> BatteryTopics::start() {
   TRY(link_.start());
-  running_ = true;
-  thread_ = std::thread([this] { run(); });
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   return {};
 }
 
 void BatteryTopics::stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!std::exchange(running_, false)) return;
-  }
-  wake_.notify_all();
-  thread_.join();
+  if (!thread_.joinable()) return;
+  thread_ = {};
   (void)link_.publish(connection_topic_, connection_message("OFFLINE"), 1,
                       true);  // without a broker it is not sent
   link_.stop();
@@ -124,9 +119,9 @@ void BatteryTopics::on_change(const std::string& why) {
   wake_.notify_all();
 }
 
-void BatteryTopics::run() {
+void BatteryTopics::run(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  while (running_) {
+  while (!stop.stop_requested()) {
     const bool greet = std::exchange(greet_, false);
     lock.unlock();
     survive("MQTT", [&] {
@@ -134,7 +129,7 @@ void BatteryTopics::run() {
       if (link_.is_connected()) publish_all();
     });
     lock.lock();
-    wake_.wait_for(lock, options_.period, [this] { return !running_ || greet_; });
+    wake_.wait_for(lock, stop, options_.period, [this] { return greet_; });
   }
 }
 

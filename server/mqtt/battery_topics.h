@@ -122,7 +122,7 @@ class BatteryTopics {
   std::string begin_message(const std::string& topic, const std::string& manufacturer,
                             const std::string& serial_number);
   void on_change(const std::string& why);
-  void run();
+  void run(const std::stop_token& stop);
   void publish_all();
 
   Options options_;
@@ -130,11 +130,11 @@ class BatteryTopics {
   const std::string connection_topic_;
   std::map<std::string, std::uint32_t> header_ids_;  // of each topic
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  bool running_ = false, refused_ = false, greet_ = false;
+  std::condition_variable_any wake_;
+  bool refused_ = false, greet_ = false;
   std::atomic<std::uint64_t> connections_ = 0, published_ = 0, failed_ = 0;
   BrokerLink link_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace joulecast::server

@@ -41,6 +41,7 @@ const options = {
   charset: 'utf8',
   jsx: 'automatic',
   jsxImportSource: 'preact',
+  loader: { '.md': 'text' },
   banner: { js: '/* joulecast operator page, built from source/; licences: third_party.txt */' },
   legalComments: 'none',
   write: false,
@@ -93,7 +94,6 @@ async function products() {
   );
   for (const name of ['index.html', 'favicon.svg'])
     files.set(name, await readFile(path.join(here, 'source', name)));
-  files.set('glossary.txt', await readFile(path.join(here, 'source/glossary.md')));
   files.set('third_party.txt', Buffer.from(await thirdParty()));
   files.set('report.template', Buffer.from(await reportTemplate()));
   return files;

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
-#include <cmath>
 #include <limits>
 #include <optional>
 
+#include "base/text.h"
 #include "base/text_file.h"
 #include "base/try.h"
 
@@ -39,20 +38,10 @@ std::vector<std::string_view> cells_of(std::string_view line) {
   std::vector<std::string_view> cells;
   for (;;) {
     const std::size_t comma = line.find(',');
-    std::string_view cell = line.substr(0, comma);
-    while (cell.starts_with(' ')) cell.remove_prefix(1);
-    while (cell.ends_with(' ')) cell.remove_suffix(1);
-    cells.push_back(cell);
+    cells.push_back(trimmed(line.substr(0, comma)));
     if (comma == std::string_view::npos) return cells;
     line.remove_prefix(comma + 1);
   }
-}
-
-std::optional<double> number(std::string_view cell) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
 }
 
 bool same_name(std::string_view a, std::string_view b) {
@@ -118,7 +107,7 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
       if (!(at)[c]) continue;
       const std::string_view cell = *(at)[c] < cells.size() ? cells[*(at)[c]] : std::string_view{};
       if (c == temperature_column && (cell.empty() || same_name(cell, "nan"))) continue;
-      const auto read = number(cell);
+      const auto read = to_number<double>(cell);
       if (!read)
         return invalid(
             std::string(column_names[c][0]),

@@ -1,21 +1,13 @@
 #include "history/bulk_rows.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <charconv>
 #include <utility>
 
 #include "history/schema.h"
 
 namespace joulecast::history {
-namespace {
-
-template <class Number>
-void append(std::string& text, Number number) {
-  std::array<char, 32> digits{};
-  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr);
-}
-
-}  // namespace
 
 BulkRows::BulkRows(std::string table, std::string columns,
                    std::function<std::string(const std::string& from)> sql)
@@ -33,13 +25,11 @@ void BulkRows::bind_null(int parameter) {
 }
 
 void BulkRows::bind(int parameter, std::int64_t value) {
-  at(parameter).clear();
-  append(at(parameter), value);
+  at(parameter) = fmt::to_string(value);
 }
 
 void BulkRows::bind(int parameter, double value) {
-  at(parameter).clear();
-  append(at(parameter), value);
+  at(parameter) = fmt::to_string(value);
 }
 
 // Within quotes a backslash stands before quotes and backslashes.
@@ -104,12 +94,15 @@ void BulkRows::flush(Database& database) {
   clear();
 }
 
-BulkRows bulk_replace(const std::string& table, const std::string& key, const std::string& others) {
-  const std::string columns = key + ", " + others;
+BulkRows bulk_insert(const std::string& table, const std::string& columns, const std::string& on_conflict) {
   return {table, columns, [=](const std::string& from) {
             return "INSERT INTO " + table + " (" + columns + ") SELECT " + columns + " FROM " + from +
-                   or_replace(key, others);
+                   on_conflict;
           }};
+}
+
+BulkRows bulk_replace(const std::string& table, const std::string& key, const std::string& others) {
+  return bulk_insert(table, key + ", " + others, or_replace(key, others));
 }
 
 }  // namespace joulecast::history

@@ -52,6 +52,8 @@ class BulkRows final : public Statement {
   bool any_ = false;
 };
 
+BulkRows bulk_insert(const std::string& table, const std::string& columns,
+                     const std::string& on_conflict = {});
 // Replaces rows of the same key; the key's columns are the first of `columns`.
 BulkRows bulk_replace(const std::string& table, const std::string& key, const std::string& others);
 

@@ -284,24 +284,15 @@ Result<std::vector<LiveState>> SharedState::news(const std::string& own_node) {
 
 Result<std::map<std::string, std::optional<std::int64_t>>> SharedState::active_models() {
   return work([&](Database& database) -> Result<std::map<std::string, std::optional<std::int64_t>>> {
-    std::map<std::string, std::optional<std::int64_t>> models;
-    for (Rows rows(database, "SELECT robot_id, active_version FROM robot"); rows.next();) {
-      std::string robot_id = rows.text();
-      models.emplace(std::move(robot_id), rows.optional_integer());
-    }
-    return models;
+    Rows rows(database, "SELECT robot_id, active_version FROM robot");
+    return read_by_name<std::map<std::string, std::optional<std::int64_t>>>(rows);
   });
 }
 
 Result<std::map<std::string, std::int64_t>> SharedState::learned(const std::string& topic) {
   return work([&](Database& database) -> Result<std::map<std::string, std::int64_t>> {
-    std::map<std::string, std::int64_t> times;
     Rows rows(database, "SELECT robot_id, utime_us FROM learned WHERE topic = ?", topic);
-    while (rows.next()) {
-      std::string robot_id = rows.text();
-      times.emplace(std::move(robot_id), rows.integer());
-    }
-    return times;
+    return read_by_name<std::map<std::string, std::int64_t>>(rows);
   });
 }
 

@@ -1,7 +1,5 @@
 #include "history/mission_days.h"
 
-#include <algorithm>
-
 #include "history/sql_rows.h"
 
 namespace joulecast::history {

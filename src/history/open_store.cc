@@ -80,7 +80,6 @@ Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOpt
   TRY(check_store_url(url));
   if (is_postgres_url(url)) return open_postgres_store(url, options);
   if (!options.shared_writer.empty()) return invalid("url", "must be postgresql://...");
-  if (!options.standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
   return open_sqlite_store(sqlite_path(url), options);
 }
 

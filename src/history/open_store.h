@@ -21,13 +21,6 @@ enum class Durability {
   process_end  // synchronous=NORMAL: a power cut loses the last commits, and damages nothing
 };
 
-// A standby of a store's server, for Store::past().
-struct StandbyOptions {
-  std::string url;             // as the store's; empty: none
-  double max_staleness_s = 5;  // beyond, the store itself is queried
-  std::size_t readers = 4;     // connections; further queries wait for one
-};
-
 struct StoreOptions {
   std::size_t readers = 4;                          // connections for queries; further queries wait for one
   std::int64_t busy_timeout_ms = 2000;              // how long a commit waits for a lock of another program
@@ -36,7 +29,6 @@ struct StoreOptions {
   // Of a PostgreSQL alone, as those below.
   std::chrono::milliseconds lock_wait{3000};  // for another program's hold on the store to end
   std::chrono::milliseconds query_limit{0};   // each statement of a query; 0: unlimited
-  StandbyOptions standby = {};
   // If set: this program's name among those that write to the store at the same time, from new_writer_name().
   // All of them set it.
   std::string shared_writer = {};
@@ -52,8 +44,8 @@ Result<void> check_store_url(const std::string& url);
 
 // Opens the store of a URL, creating or migrating its schema: sqlite:PATH, a PATH, or postgresql://..., whose
 // tables are in the first schema of the search_path. One program at a time holds a store, or several a
-// PostgreSQL with shared_writer. The standby is not queried yet. Fault::conflict: another program holds it,
-// or its schema is newer than this program. Fault::corrupt: the file is no database, or damaged.
+// PostgreSQL with shared_writer. Fault::conflict: another program holds it, or its schema is newer than this
+// program. Fault::corrupt: the file is no database, or damaged.
 // Fault::unavailable: it cannot be opened or written. Fault::invalid: the URL, or an option that it excludes.
 Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options = {});
 // The parts of that.

@@ -219,8 +219,7 @@ Result<void> check_postgres_url(const std::string& url) {
   return sound;
 }
 
-PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name,
-                                   const char* session) {
+PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {
   // Options of the URL come later and take precedence, except for the name. A peer that vanished is detected
   // within half a minute.
   const std::array<const char*, 10> keywords = {"connect_timeout",
@@ -234,7 +233,7 @@ PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& ap
                                                 "client_encoding",
                                                 nullptr};
   const std::array<const char*, 10> values = {
-      "5", session, "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
+      "5", "read-write", "15000", "10", "5", "3", url.c_str(), application_name.c_str(), "UTF8", nullptr};
   handle_ = PQconnectdbParams(keywords.data(), values.data(), 1);
   if (PQstatus(handle_) != CONNECTION_OK) {
     const std::string message = trimmed(PQerrorMessage(handle_));

@@ -23,10 +23,9 @@ Result<void> check_postgres_url(const std::string& url);
 // A connection through libpq. The URL is libpq's (postgresql://user@host1,host2/database?option=value).
 class PostgresDatabase final : public Database {
  public:
-  // `application_name` identifies the connection in pg_stat_activity. `session`: which of several hosts are
-  // acceptable, unless the URL specifies it (libpq's target_session_attrs).
-  PostgresDatabase(const std::string& url, const std::string& application_name,
-                   const char* session = "read-write");
+  // `application_name` identifies the connection in pg_stat_activity. Of several hosts one that takes writes
+  // is used, unless the URL specifies another (libpq's target_session_attrs).
+  PostgresDatabase(const std::string& url, const std::string& application_name);
   ~PostgresDatabase() override;
 
   void execute(const std::string& sql) override;

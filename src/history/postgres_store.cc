@@ -12,7 +12,6 @@
 #include "history/audit.h"
 #include "history/open_store.h"
 #include "history/postgres.h"
-#include "history/postgres_standby.h"
 #include "history/schema.h"
 #include "history/spool.h"
 #include "history/sql_changes.h"
@@ -139,13 +138,6 @@ class PostgresStore final : public SqlStore {
     }
     set_mark(std::move(last));
     use(std::move(writer));
-    if (!options.standby.url.empty())
-      standby_ = std::make_unique<PostgresStandby>(options.standby, options.query_limit, url_, name_, *this);
-  }
-
-  Past past() const override { return standby_ ? standby_->past() : SqlStore::past(); }
-  std::optional<StandbyStatus> standby() const override {
-    return standby_ ? std::optional(standby_->status()) : std::nullopt;
   }
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
@@ -327,8 +319,7 @@ class PostgresStore final : public SqlStore {
   std::int64_t batch_ = 0;  // the last one tried
   std::atomic<std::uint64_t> fenced_ = 0, fenced_samples_ = 0;
   std::optional<InDoubt> in_doubt_;
-  std::string taken_over_;                    // why the store is lost to this program; empty: it is not
-  std::unique_ptr<PostgresStandby> standby_;  // the first to go
+  std::string taken_over_;  // why the store is lost to this program; empty: it is not
 };
 
 }  // namespace

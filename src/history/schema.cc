@@ -14,6 +14,7 @@
 #include "base/try.h"
 #include "history/audit.h"
 #include "history/mission_days.h"
+#include "history/sql_rows.h"
 #include "history/sqlite.h"
 
 namespace joulecast::history {
@@ -47,13 +48,8 @@ void restore_objects(Database& database, const Schema& schema) {
   });
   if (differences.empty()) return;
   const auto names = [](Database& of, const char* type) {
-    std::map<std::string, std::string> found;
     Rows rows(of, "SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND type = ?", type);
-    while (rows.next()) {
-      std::string name = rows.text();
-      found[std::move(name)] = rows.text();
-    }
-    return found;
+    return read_by_name<std::map<std::string, std::string>>(rows);
   };
   SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
   made.execute(std::string(schema.sql));

@@ -60,13 +60,6 @@ BulkRows bulk_checkpoints() {
           }};
 }
 
-BulkRows bulk_tails() {
-  return {"telemetry_chunk", chunks::telemetry_columns(), [](const std::string& from) {
-            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_columns() + ") SELECT " +
-                   chunks::telemetry_columns() + " FROM " + from;
-          }};
-}
-
 Result<void> check_covariates(const std::vector<signals::CovariateChange>& changes) {
   for (std::size_t i = 0; i < changes.size(); ++i)
     if (!signals::is_valid_covariate_name(changes[i].name))
@@ -79,7 +72,7 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 struct SqlChanges::Bulk {
   BulkRows missions = bulk_checkpoints();
   BulkRows trace = bulk_replace("trace", "mission_key, start_utime_us", columns_of<TraceBucket>(1));
-  BulkRows telemetry = bulk_tails();
+  BulkRows telemetry = bulk_insert("telemetry_chunk", chunks::telemetry_columns());
   BulkRows states = bulk_replace("energy_state", "robot_id", columns_of<ResumeState>(1));
   std::set<MissionKey> keys;        // of missions with rows here
   std::set<std::string> robot_ids;  // of states here
@@ -185,10 +178,7 @@ void SqlChanges::lock_leases(std::span<const Command> commands) {
             "SELECT robot_id, epoch FROM cluster_lease WHERE robot_id IN (SELECT "
             "json_array_elements_text(?::json)) ORDER BY robot_id FOR NO KEY UPDATE",
             names);
-  while (rows.next()) {
-    std::string robot_id = rows.text();
-    epochs_.emplace(std::move(robot_id), rows.integer());
-  }
+  epochs_ = read_by_name<decltype(epochs_)>(rows);
 }
 
 bool SqlChanges::stands(const Command& command) {

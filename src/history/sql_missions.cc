@@ -108,8 +108,8 @@ Result<Mission> Store::mission(MissionKey key) const {
   });
 }
 
-Result<MissionPage> History::missions(const MissionFilter& filter, const PageRequest& page,
-                                      MissionSort sort) const {
+Result<MissionPage> Store::missions(const MissionFilter& filter, const PageRequest& page,
+                                    MissionSort sort) const {
   return read([&](Database& database) -> Result<MissionPage> {
     TRY(check_filter(filter));
     TRY(check_limit("limit", page.limit, max_page_size));
@@ -226,7 +226,7 @@ class Summed {
 
 }  // namespace
 
-Result<Totals> History::totals(const MissionFilter& filter) const {
+Result<Totals> Store::totals(const MissionFilter& filter) const {
   return read([&](Database& database) -> Result<Totals> {
     TRY(check_filter(filter));
     const Summed summed(database, filter, true);
@@ -238,8 +238,8 @@ Result<Totals> History::totals(const MissionFilter& filter) const {
   });
 }
 
-Result<std::vector<TotalsGroup>> History::grouped_totals(const MissionFilter& filter, Grouping by,
-                                                         std::int64_t utc_offset_s) const {
+Result<std::vector<TotalsGroup>> Store::grouped_totals(const MissionFilter& filter, Grouping by,
+                                                       std::int64_t utc_offset_s) const {
   return read([&](Database& database) -> Result<std::vector<TotalsGroup>> {
     TRY(check_filter(filter));
     const bool timed = by != Grouping::robot, of_robots = by != Grouping::day && by != Grouping::week;

@@ -101,7 +101,7 @@ MissionKey greatest_key(Database& database) {
   return database.integer("SELECT coalesce(max(mission_key), 0) FROM mission");
 }
 
-Result<Trace> History::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
+Result<Trace> Store::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
   return read([&](Database& database) -> Result<Trace> {
     TRY(check_range(range));
     TRY(check_limit("points", max_points, max_trace_points));
@@ -130,14 +130,14 @@ Result<Trace> History::trace(MissionKey key, TimeRange range, std::int64_t max_p
   });
 }
 
-Result<TelemetryPage> History::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
+Result<TelemetryPage> Store::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
   return read([&](Database& database) -> Result<TelemetryPage> {
     TRY(check_page(database, key, range, page));
     return chunks::telemetry(database, key, range, page);
   });
 }
 
-Result<CovariatePage> History::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
+Result<CovariatePage> Store::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
   return read([&](Database& database) -> Result<CovariatePage> {
     TRY(check_page(database, key, range, page));
     return chunks::covariates(database, key, range, page);

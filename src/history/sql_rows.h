@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -103,6 +104,17 @@ Result<std::vector<T>> read_all(Rows& rows, Result<T> (*read)(Rows&) = read_reco
   while (rows.next()) {
     TRY_ASSIGN(T one, read(rows));
     all.push_back(std::move(one));
+  }
+  return all;
+}
+
+// All rows, a name and its value each.
+template <class Map>
+Map read_by_name(Rows& rows) {
+  Map all;
+  while (rows.next()) {
+    std::string name = rows.text();
+    read_value(rows, all[std::move(name)]);
   }
   return all;
 }

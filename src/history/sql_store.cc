@@ -1,8 +1,6 @@
 #include "history/sql_store.h"
 
 #include <algorithm>
-#include <iterator>
-#include <optional>
 #include <random>
 
 #include "history/sql_queries.h"
@@ -20,9 +18,9 @@ std::string new_writer_name() {
 // After a failed connection: there may be many callers, and each attempt may take long.
 constexpr std::chrono::seconds connect_pause{1};
 
-ReaderPool::ReaderPool(Connect connect, std::size_t count, At at)
-    : connect_(std::move(connect)), size_(std::max<std::size_t>(count, 1)) {
-  while (idle_.size() < size_) idle_.push_back(at == At::once ? connect_() : nullptr);
+ReaderPool::ReaderPool(const Connect& connect, std::size_t count)
+    : connect_(connect), size_(std::max<std::size_t>(count, 1)) {
+  while (idle_.size() < size_) idle_.push_back(connect_());
 }
 
 Database& ReaderPool::Lease::operator*() {

@@ -31,9 +31,7 @@ auto guarded(Work work, const std::string& field = "database") -> decltype(work(
 class ReaderPool {
  public:
   using Connect = std::function<std::unique_ptr<Database>()>;
-  // Whether connections are made now, or each when it is first needed.
-  enum class At { once, need };
-  ReaderPool(Connect connect, std::size_t count, At at = At::once);
+  ReaderPool(const Connect& connect, std::size_t count);
 
   class Lease {
    public:

@@ -144,66 +144,6 @@ using Outcome = Result<std::int64_t>;
 
 class Database;  // sql.h
 
-// The queries of the past. Their errors are the Store's.
-class History {
- public:
-  virtual ~History() = default;
-
-  using Work = std::function<Result<void>(Database&)>;
-  // Runs the work on a connection to the database, in one snapshot; perhaps again on another one, if it
-  // fails. The errors are the work's, and those of the database.
-  virtual Result<void> run(const Work& work) const = 0;
-
-  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
-                               MissionSort sort = {}) const;
-  Result<Totals> totals(const MissionFilter& filter) const;
-  // Groups that have missions, ascending by robot, then by time. Days begin at midnight, weeks on Monday, of
-  // a clock that is `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
-  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
-                                                  std::int64_t utc_offset_s) const;
-
-  // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
-  // and greatest, cumulative values by the last. not_found when the mission is unknown.
-  Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const;
-  // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
-  // not_found when the mission is unknown.
-  Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const;
-
-  // Changes of the covariates: at most `page.limit` (1 to max_telemetry_samples). Values that apply at the
-  // range's beginning changed before it. Empty when the retention dropped them; not_found when the mission is
-  // unknown.
-  Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const;
-
- protected:
-  // The result of a query, run as work.
-  template <class Query>
-  auto read(Query query) const -> decltype(query(std::declval<Database&>())) {
-    decltype(query(std::declval<Database&>())) answer = fail(Fault::internal, "database", "no answer");
-    TRY(run([&](Database& database) -> Result<void> {
-      answer = query(database);
-      if (!answer) return tl::unexpected(answer.error());
-      return {};
-    }));
-    return answer;
-  }
-};
-
-// The source for queries of the past: the store itself, or a copy that is stale by at most the given time.
-// Use it immediately, since a copy becomes staler.
-struct Past {
-  const History& history;
-  std::optional<double> staleness_s;  // absent: nothing that was committed is missing
-};
-
-// State of the copy that a store also reads.
-struct StandbyStatus {
-  std::optional<double> staleness_s;  // absent: unknown
-  bool in_use = false;
-  std::uint64_t answered = 0;   // questions
-  std::uint64_t passed_on = 0;  // questions that the store itself answered instead
-  std::string why_not;          // the reason for not using it; empty: unknown
-};
-
 // Names this run of the program among all that ever wrote to a store.
 std::string new_writer_name();
 
@@ -213,8 +153,10 @@ std::string new_writer_name();
 // apply(). A query sees the commits before it began. Errors: Fault::not_found for a named thing that
 // is absent, ::invalid for a broken constraint of the arguments, ::unavailable when the disk or database
 // fails temporarily, ::corrupt when stored bytes cannot be trusted.
-class Store : public History {
+class Store {
  public:
+  virtual ~Store() = default;
+
   // Applies the commands in order in one transaction. The result is one outcome a command: a refused one
   // (not_found, conflict, invalid) leaves no trace, and the others are applied; only a refused TakeSpool
   // refuses all. An error means that nothing was applied.
@@ -242,6 +184,11 @@ class Store : public History {
   // Fault::unavailable if the database has been away for a thousand missions.
   virtual Result<MissionKey> new_mission_key() = 0;
 
+  using Work = std::function<Result<void>(Database&)>;
+  // Runs the work on a connection to the database, in one snapshot; perhaps again on another one, if it
+  // fails. The errors are the work's, and those of the database.
+  virtual Result<void> run(const Work& work) const = 0;
+
   // By robot_id ascending.
   Result<std::vector<RobotRecord>> robots() const;
   // The active version, or the given one.
@@ -251,6 +198,25 @@ class Store : public History {
   Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const;
 
   Result<Mission> mission(MissionKey key) const;
+  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
+                               MissionSort sort = {}) const;
+  Result<Totals> totals(const MissionFilter& filter) const;
+  // Groups that have missions, ascending by robot, then by time. Days begin at midnight, weeks on Monday, of
+  // a clock that is `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
+  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
+                                                  std::int64_t utc_offset_s) const;
+
+  // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
+  // and greatest, cumulative values by the last. not_found when the mission is unknown.
+  Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const;
+  // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
+  // not_found when the mission is unknown.
+  Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const;
+
+  // Changes of the covariates: at most `page.limit` (1 to max_telemetry_samples). Values that apply at the
+  // range's beginning changed before it. Empty when the retention dropped them; not_found when the mission is
+  // unknown.
+  Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const;
   // Passes each mission that matches to the sink, in the order of keys, outside of any lock: its sums by
   // square of `cell_m` metres (least_floor_cell_m to greatest_floor_cell_m). Reads at most about `max_points`
   // seconds of missions (1 to max_floor_points); above that, an even share of the missions.
@@ -289,11 +255,6 @@ class Store : public History {
   Result<std::vector<Proposal>> proposals(const std::optional<std::string>& robot_id, std::int64_t before_id,
                                           std::int64_t limit) const;
 
-  // For queries that need not include the commits of the last seconds.
-  virtual Past past() const { return {*this, std::nullopt}; }
-  // Absent where there is no copy to read.
-  virtual std::optional<StandbyStatus> standby() const { return std::nullopt; }
-
   // At start: the missions that were open when the last daemon ended, oldest first. Each is to be resumed
   // (just go on checkpointing it) or ended by a checkpoint with MissionState::interrupted.
   Result<std::vector<Mission>> recover() const;
@@ -302,6 +263,19 @@ class Store : public History {
 
   // What was learned of every robot on a topic, by id.
   Result<std::vector<Learned>> all_learned(std::string_view topic) const;
+
+ protected:
+  // The result of a query, run as work.
+  template <class Query>
+  auto read(Query query) const -> decltype(query(std::declval<Database&>())) {
+    decltype(query(std::declval<Database&>())) answer = fail(Fault::internal, "database", "no answer");
+    TRY(run([&](Database& database) -> Result<void> {
+      answer = query(database);
+      if (!answer) return tl::unexpected(answer.error());
+      return {};
+    }));
+    return answer;
+  }
 };
 
 }  // namespace joulecast::history

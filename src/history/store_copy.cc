@@ -1,5 +1,7 @@
 #include "history/store_copy.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -46,9 +48,7 @@ std::vector<std::string> ordered_columns(const Table& table) {
 }
 
 std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 std::int64_t rows_of(Database& database, const Table& table) {

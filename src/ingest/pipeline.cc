@@ -246,7 +246,8 @@ void Pipeline::count_unknown_robot(const InboundMessage& message) {
     found->second.snapshot.robot_id = message.robot_id;
     if (told_utime_us_ == 0 || message.host_utime_us - told_utime_us_ >= tell_period_us) {
       told_utime_us_ = message.host_utime_us;
-      outputs_.warn(message.robot_id, "has no model: its messages are counted and not accounted for");
+      outputs_.warn(message.robot_id,
+                    "has no robot file: its messages are only counted; add the file on the page");
     }
   }
   RobotSnapshot& snapshot = found->second.snapshot;

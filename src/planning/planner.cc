@@ -94,17 +94,18 @@ class Request {
   }
 
   // Solves every run at one price of time; as fast as the limits allow at an infinite one.
-  Result<void> solve(double price_w) {
+  Result<void> solve(double price_w, const std::optional<Due>& due = {}) {
     keep();
     price_w_ = price_w;
     answers_.clear();
     answers_.reserve(runs_.size());
     std::size_t nodes = 0;
     for (RunPlanner& run : runs_) {
-      TRY_ASSIGN(RunAnswer answer, run.solve(price_w, stop_));
+      TRY_ASSIGN(RunAnswer answer, run.solve(price_w, stop_, due));
       iterations_ += answer.iterations;
       if ((nodes += run.nodes()) > most_nodes) return too_long();
       if (brief() && run.uniform()) answer.forget_motion();
+      if (due) price_w_ = answer.price_w;
       answers_.push_back(std::move(answer));
     }
     return {};
@@ -127,7 +128,7 @@ class Request {
     if (free && free->duration_s <= deadline * 1.02) {
       TRY(solve(problem_.value_of_time_w));
       if (duration_s() <= deadline) return {};
-      least_j_ = cost_j();
+      bound_by(deadline);
     } else if (!free) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (free.error().fault != Fault::infeasible || free.error().field != "value_of_time_w")
@@ -252,15 +253,28 @@ class Request {
     if (grids) {
       // Rough grids do not distinguish the highest prices.
       Search near = at;
-      near.most = std::max(at.x, std::log(30 * std::max(usual_w_, 1e-3)));
-      TRY(draw_in(near, 0.02, roughly_late));
-      if (near.x < near.most) at.x = near.x, at.slope = near.slope;
+      const double most_w = 30 * std::max(usual_w_, 1e-3);
+      near.most = std::max(at.x, std::log(most_w));
+      if (runs_.size() == 1) {
+        // Found together with the motion, to the solver's tolerance of the duration.
+        TRY_ASSIGN(const double y, roughly_late(at.x));
+        const double guess = std::clamp(at.x - y / at.slope, at.least, near.most);
+        TRY(solve(price_at(guess), Due{deadline * (1 - 2e-6) - dwell_s_, most_w}));
+        at.x = std::clamp(std::log(idle + price_w_), at.least, near.most);
+      } else {
+        TRY(draw_in(near, 0.02, roughly_late));
+        if (near.x < near.most) at.x = near.x, at.slope = near.slope;
+      }
     }
     // The unused time may cost a small share of the energy, or of the freedom that the deadline leaves.
     const double little_s =
         std::max({1e-6 * deadline, 1e-3 * (deadline - least_s), 1e-4 * usual_w_ * deadline / price_at(at.x)});
     const double early = -std::log1p(-std::min(0.5, std::min(early_s, little_s) / (deadline - least_s)));
-    TRY(draw_in(at, early, truly_late));
+    const double y = answers_.empty() || price_w_ < problem_.value_of_time_w ? 1 : late(duration_s());
+    if (y <= 0 && y > -early)
+      bound_by(deadline);
+    else
+      TRY(draw_in(at, early, truly_late));
     keep();
     // Closer to the shortest time than any finite price comes.
     return kept_.answers.empty() ? solve(at_once_w) : Result<void>{};
@@ -281,10 +295,10 @@ class Request {
     for (int k = 0; k < 60 && fast - slow > 1e-9; ++k) {
       const double x = at.x;
       TRY_ASSIGN(const double y, late(x));
+      if (k > 0) at.slope = std::clamp((y - last_y) / (x - last_x), -5.0, -0.05);
       if (y <= 0 && y > -early) break;
       (y > 0 ? slow : fast) = x;
       if (x == (y > 0 ? at.most : at.least)) break;
-      if (k > 0) at.slope = std::clamp((y - last_y) / (x - last_x), -5.0, -0.05);
       last_x = x, last_y = y;
       const double step = -(y + 0.5 * early) / at.slope;
       const bool enclosed = std::isfinite(fast - slow);
@@ -407,12 +421,13 @@ class Writer {
     for (std::size_t k = 0; k < times.size(); ++k) {
       const bool last = k + 1 == times.size();
       const State s = last ? at(k - 1, 1.0) : at(k, 0.0);
-      row(planner, s, start_s_ + times[k]);
+      const dynamics::PowerFlow<double> here = flow(planner, s);
+      row(planner, s, start_s_ + times[k], here.battery_power_w);
       if (last) break;
       const double span = times[k + 1] - times[k];
       const State next = at(k, 1.0);
       int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
-      if (loads_.electric().up != loads_.electric().down && turns(flow(planner, s), flow(planner, next)))
+      if (loads_.electric().up != loads_.electric().down && turns(here, flow(planner, next)))
         parts = std::max(parts, parts_of_turn);
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
@@ -488,10 +503,9 @@ class Writer {
     }
   }
 
-  void row(const RunPlanner& planner, const State& s, double time_s) {
+  void row(const RunPlanner& planner, const State& s, double time_s, double power) {
     const Run& run = planner.run();
     const Knot knot = run.at(s.way);
-    const double power = flow(planner, s).battery_power_w;
     if (run.turn != 0) {
       push(time_s, driven_m_, knot.pose, 0, run.turn * s.speed, 0, run.turn * s.acceleration, run.payload_kg,
            power);

@@ -23,13 +23,12 @@ constexpr std::size_t most_cells = 200'000;
 // cells.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
 constexpr double lost_tolerance = 8e-5;
-constexpr double most_residual = 5e-3;  // relative, of stationarity
 // Relative to the shortest time: the greatest loss of its cells.
 constexpr double time_tolerance = 1e-4;
 // The greatest number of refinements, and of cells relative to the first grid: not all losses fall with the
 // size of cells.
 constexpr int most_rounds = 3;
-constexpr std::size_t most_growth = 8;
+constexpr std::size_t most_growth = 16, most_uniform_growth = 64;
 constexpr double near_limits = 0.01;  // of motors, in the middle of a cell whose knots are looked at
 constexpr double at_knots = std::numeric_limits<double>::infinity();  // parts of a cell: one for each knot
 
@@ -532,10 +531,9 @@ double RunPlanner::shortest_s() {
 const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
   if (fastest_) return *fastest_;
   constexpr double unimportant = 1e5;  // times the mean power
-  FastMotion fastest{fastest_nodes_, {}};
-  auto solver = std::make_unique<SpeedSolver>(grid_over(fastest.nodes));
-  if (!solver->envelope().feasible)
-    fastest.nodes = nodes_, solver = std::make_unique<SpeedSolver>(solver_->grid());
+  const bool rough = !rough_solver_;
+  FastMotion fastest{rough ? nodes_ : rough_nodes_, {}};
+  auto solver = std::make_unique<SpeedSolver>(rough ? *solver_ : *rough_solver_);
   std::vector<double> nodes = fastest.nodes, start;
   fastest.solution.z = solver->envelope().fastest,
   fastest.solution.duration_s = solver->envelope().shortest_s;
@@ -559,18 +557,25 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
       s = solver->solve(price_w, coarse_tolerance);
       if (!s.converged) break;
       for (std::size_t k = 0; k < s.ends_j.size(); ++k) lost_s[k] += s.ends_j[k] / price_w;
+    } else {
+      // The first and the last cell could hold the faster of their ends' speeds but for the acceleration.
+      for (const std::size_t k : {std::size_t{0}, grid.cells() - 1}) {
+        const double faster = std::sqrt(std::max(s.z[k], s.z[k + 1])), mean = mean_speed(s.z[k], s.z[k + 1]),
+                     ramp_s = 2 * (faster - mean) / grid.acceleration_limit;
+        lost_s[k] = (1 / mean - 1 / faster) * std::max(0.0, grid.step[k] - ramp_s * mean);
+      }
     }
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
     const double most_s = time_tolerance * s.duration_s;
-    const std::vector<double> parts = least_parts(grid, nodes, s.z, 1);
+    const std::vector<double> parts = least_parts(grid, nodes, s.z, round == 0 ? 2 : 1);
     fastest.nodes = nodes, fastest.solution = std::move(s);
     if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
     nodes = split(fastest.nodes, lost_s, 0.8 * most_s, parts);
     start = resampled(fastest.nodes, fastest.solution.z, nodes);
     solver = std::make_unique<SpeedSolver>(grid_over(nodes));
   }
-  fastest.solution.cost_j = sum_of(driven_j(fastest.nodes, fastest.solution.z));
+  fastest.solution.price_w = 0, fastest.solution.cost_j = sum_of(driven_j(fastest.nodes, fastest.solution.z));
   return fastest_.emplace(std::move(fastest));
 }
 
@@ -613,7 +618,6 @@ std::size_t RunPlanner::nodes() const {
 
 Result<void> RunPlanner::build_grid() {
   const std::size_t cells = std::max<std::size_t>(8, problem_->intervals_per_run);
-  fastest_nodes_ = first_nodes(uniform_ ? 4 * cells : 2 * cells);
   build(first_nodes(uniform_ ? cells / 2 : cells));
   return check_feasible();
 }
@@ -685,11 +689,19 @@ std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const st
   std::vector<double> finer{nodes.front()};
   for (std::size_t k = 0; k < lost.size(); ++k) {
     const double wanted = std::ceil(std::sqrt(lost[k]) * roots / most - 0.5);
-    const double parts = nodes.size() > most_cells ? 1 : std::min(std::max(wanted, least[k]), most_parts),
-                 part = (nodes[k + 1] - nodes[k]) / parts;
+    const bool knots = least[k] == at_knots;
+    const double parts =
+        nodes.size() > most_cells ? 1 : std::min(knots ? wanted : std::max(wanted, least[k]), most_parts);
+    const double part = (nodes[k + 1] - nodes[k]) / parts;
+    const auto divide_to = [&](double way) {
+      const double from = finer.back(), count = std::round((way - from) / part);
+      for (double i = 1; i < count; ++i) finer.push_back(from + i / count * (way - from));
+      finer.push_back(way);
+    };
     auto knot = knot_after(nodes[k]);
-    if (least[k] == at_knots) {
-      for (; knot->way < nodes[k + 1]; ++knot) finer.push_back(knot->way);
+    if (knots) {
+      for (; knot->way < nodes[k + 1]; ++knot) divide_to(knot->way);
+      divide_to(nodes[k + 1]);
     } else {
       for (double i = 1; i < parts; ++i) {
         const double even = nodes[k] + part * i;
@@ -697,24 +709,25 @@ std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const st
         const double way = knot->way < even + 0.5 * part ? knot->way : even;
         if (way > finer.back() && way < nodes[k + 1]) finer.push_back(way);
       }
+      finer.push_back(nodes[k + 1]);
     }
-    finer.push_back(nodes[k + 1]);
   }
   return finer;
 }
 
-Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop) {
+Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop,
+                                    const std::optional<Due>& due) {
   if (stop.stop_requested()) return stopped();
   if (!std::isfinite(price_w)) return fastest();
-  if (auto answer = closed_form(price_w)) return std::move(*answer);
+  if (auto answer = closed_form(price_w); answer && !due) return std::move(*answer);
   if (uniform_ && !motion_ && !solver_) find_motion();
   if (motion_) {
     TRY_ASSIGN(SteppedMotion motion, motion_->solve(price_w));
     return answer_of(std::move(motion));
   }
   if (!solver_) TRY(build_grid());
-  TRY_ASSIGN(const SpeedSolution solution, solve_grid(price_w, stop));
-  return answer_of(solution, nodes_, price_w);
+  TRY_ASSIGN(const SpeedSolution solution, solve_grid(price_w, stop, due));
+  return answer_of(solution, nodes_);
 }
 
 Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_token& stop) {
@@ -734,23 +747,26 @@ Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_toke
   return answer;
 }
 
-const SpeedSolution& RunPlanner::solve_rough_grid(double price_w, const std::stop_token& stop) {
-  if (price_w == rough_price_w_) return rough_;
-  rough_ = (rough_solver_ ? rough_solver_ : solver_)->solve(price_w, coarse_tolerance, stop);
-  rough_price_w_ = price_w;
+const SpeedSolution& RunPlanner::solve_rough_grid(double price_w, const std::stop_token& stop,
+                                                  const std::optional<Due>& due) {
+  if (price_w == rough_price_w_ && !due) return rough_;
+  rough_ = (rough_solver_ ? rough_solver_ : solver_)->solve(price_w, coarse_tolerance, stop, due);
+  rough_price_w_ = rough_.price_w;
   return rough_;
 }
 
-Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
+Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop,
+                                             const std::optional<Due>& due) {
   if (const double standing = standing_power_w(solver_->grid()) + price_w; !(standing > 0))
     return endless(standing);
-  SpeedSolution s =
-      refined_ ? solver_->solve(price_w, fine_tolerance, stop) : solve_rough_grid(price_w, stop);
-  if (refined_ && !s.converged) {
+  SpeedSolution s;
+  if (refined_ && !due) s = solver_->solve(price_w, fine_tolerance, stop);
+  if (!s.converged) {
     // Another price of time may need other nodes.
-    refined_ = false;
-    build(rough_nodes_);
-    s = solve_rough_grid(price_w, stop);
+    if (std::exchange(refined_, false)) build(rough_nodes_);
+    s = solve_rough_grid(price_w, stop, due);
+    // A first grid may not be as fast as finer ones.
+    if (due && !s.converged) s = solve_rough_grid(price_w, stop);
   }
   int iterations = s.iterations;
   std::vector<double> driven, lost;
@@ -758,9 +774,10 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   // yields its error.
   for (int round = 0; s.converged; ++round) {
     driven = driven_j(nodes_, s.z);
-    lost = lost_j(s, driven, price_w);
+    lost = lost_j(s, driven);
     const double most = lost_tolerance * std::fabs(s.cost_j);
-    const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
+    const bool grown = round == most_rounds ||
+                       nodes_.size() >= (uniform_ ? most_uniform_growth : most_growth) * rough_nodes_.size();
     const std::vector<double> parts = least_parts(solver_->grid(), nodes_, s.z, refined_ ? 1 : 2);
     if (refined_ && (grown || (sum_of(lost) <= most && std::ranges::max(parts) == 1))) break;
     const std::vector<double> coarse_nodes = nodes_;
@@ -773,25 +790,20 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
       build(std::move(onto));
       solver_->start_from(start);
     };
-    const auto solved_on = [&](std::vector<double> onto) {
-      rebuild(std::move(onto));
-      return solver_->solve(price_w, fine_tolerance, stop);
-    };
-    const auto stands = [](const SpeedSolution& of) { return of.converged && of.residual < most_residual; };
-    SpeedSolution finer = solved_on(
-        uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
-                              : split(nodes_, lost, 0.8 * most, parts));
-    // Where power is concave, some grids make it hard to find an optimum: even halves are the gentlest.
-    if (!stands(finer) && !refined_)
-      finer = solved_on(
-          split(coarse_nodes, std::vector<double>(lost.size()), 1, std::vector<double>(lost.size(), 2)));
-    if (!(refined_ ? stands(finer) : finer.converged)) {
+    rebuild(uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
+                                  : split(nodes_, lost, 0.8 * most, parts));
+    SpeedSolution finer = solver_->solve(s.price_w, fine_tolerance, stop, due);
+    if (!finer.converged || (refined_ && !finer.stationary())) {
       if (!refined_) s.gap_j = s.cost_j;  // the error of a coarse grid is unknown
       rebuild(coarse_nodes);
       break;
     }
     iterations += finer.iterations;
-    coarse_error_ = std::max(coarse_error_, std::fabs(s.cost_j / finer.cost_j - 1));
+    // At one price; a change of price changes its optimum by that times a duration between the two.
+    const double dearer_w = finer.price_w - s.price_w,
+                 error_j = std::fabs(s.cost_j + dearer_w * s.duration_s - finer.cost_j) -
+                           std::fabs(dearer_w * (finer.duration_s - s.duration_s));
+    coarse_error_ = std::max(coarse_error_, error_j / std::fabs(finer.cost_j));
     refined_ = true;
     s = std::move(finer);
   }
@@ -799,7 +811,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   // Nothing bounds the optimum from below then but that energy is not negative.
   if (!s.converged) driven = driven_j(nodes_, s.z), s.gap_j = s.cost_j, s.convex = false;
   s.iterations = iterations;
-  s.cost_j = sum_of(driven) + price_w * s.duration_s;
+  s.cost_j = sum_of(driven) + s.price_w * s.duration_s;
   discretisation_j_ = coarse_error_ * std::fabs(s.cost_j) + sum_of(lost);
   return s;
 }
@@ -827,32 +839,31 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
 
 // Cost of each cell beyond the solver's estimate: loads and the flow of power change within it; time lost at
 // corners; limits of motors at its ends [J].
-std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector<double>& driven,
-                                       double price_w) const {
+std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector<double>& driven) const {
   std::vector<double> lost = driven;
-  const std::vector<double> reckoned = solver_->costs_j(s.z, price_w),
+  const std::vector<double> reckoned = solver_->costs_j(s.z, s.price_w),
                             corners_s = lost_at_corners_s(solver_->grid(), s.z);
   for (std::size_t k = 0; k < lost.size(); ++k) {
-    const double time_j = price_w * solver_->grid().step[k] / mean_speed(s.z[k], s.z[k + 1]);
-    lost[k] = std::max(0.0, lost[k] + time_j - reckoned[k]) + price_w * corners_s[k] +
+    const double time_j = s.price_w * solver_->grid().step[k] / mean_speed(s.z[k], s.z[k + 1]);
+    lost[k] = std::max(0.0, lost[k] + time_j - reckoned[k]) + s.price_w * corners_s[k] +
               (s.ends_j.empty() ? 0 : s.ends_j[k]);
   }
   return lost;
 }
 
-RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double>& nodes,
-                                double price_w) const {
+RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double>& nodes) const {
   RunAnswer answer;
   answer.method = Method::interior_point;
   answer.way = nodes;
   for (const double z : s.z) answer.speed.push_back(std::sqrt(z));
   answer.peak_speed = *std::max_element(answer.speed.begin(), answer.speed.end());
   answer.duration_s = s.duration_s;
-  answer.energy_j = s.cost_j - price_w * s.duration_s;
+  answer.price_w = s.price_w;
+  answer.energy_j = s.cost_j - s.price_w * s.duration_s;
   answer.gap_j = s.gap_j;
   answer.discretisation_j = discretisation_j_;
   answer.residual = s.residual;
-  answer.convex = s.convex && loads_->electric().idle_w + price_w >= 0;
+  answer.convex = s.convex && loads_->electric().idle_w + s.price_w >= 0;
   answer.iterations = s.iterations;
   answer.binding = s.binding;
   if (s.binding[static_cast<std::size_t>(Bound::speed)]) {
@@ -877,7 +888,7 @@ Result<RunAnswer> RunPlanner::fastest() {
   }
   if (!solver_) TRY(build_grid());
   const FastMotion& fast = fastest_motion();
-  RunAnswer answer = answer_of(fast.solution, fast.nodes, 0);
+  RunAnswer answer = answer_of(fast.solution, fast.nodes);
   answer.discretisation_j = 0;  // that of the last solution, at another price
   return answer;
 }

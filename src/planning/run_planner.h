@@ -21,7 +21,8 @@ struct RunAnswer {
   Method method = Method::closed_form;
   std::unique_ptr<LineMotion> line;  // closed form, over the run's coordinate
   std::vector<double> way, speed;    // else nodes of it, the acceleration being constant in between
-  double energy_j = 0;               // on the solver's own quadrature, idle power included
+  double price_w = 0;
+  double energy_j = 0;  // on the solver's own quadrature, idle power included
   double duration_s = 0;
   double gap_j = 0, discretisation_j = 0, residual = 0;
   bool convex = true;
@@ -44,8 +45,9 @@ class RunPlanner {
                                  const Problem& problem, double start_speed, double end_speed);
 
   // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
-  // acceleration.
-  Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {});
+  // acceleration. On a grid, `due` makes the price a first guess.
+  Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {},
+                          const std::optional<Due>& due = {});
   // The same on a first grid, which errs by some thousandths: near enough to search for a price of time.
   Result<RunAnswer> solve_roughly(double price_w, const std::stop_token& stop = {});
   // Where the closed form answers, over the run's length or another one.
@@ -87,11 +89,13 @@ class RunPlanner {
   };
   const FastMotion& fastest_motion();
   Result<RunAnswer> fastest();
-  const SpeedSolution& solve_rough_grid(double price_w, const std::stop_token& stop);
-  Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
+  const SpeedSolution& solve_rough_grid(double price_w, const std::stop_token& stop,
+                                        const std::optional<Due>& due = {});
+  Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop,
+                                   const std::optional<Due>& due);
   std::vector<double> driven_j(const std::vector<double>& nodes, const std::vector<double>& z) const;
-  std::vector<double> lost_j(const SpeedSolution& s, const std::vector<double>& driven, double price_w) const;
-  RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes, double price_w) const;
+  std::vector<double> lost_j(const SpeedSolution& s, const std::vector<double>& driven) const;
+  RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes) const;
   bool motors_break(double speed, double acceleration) const;
   bool motors_hold(double top, double most) const;
   Result<void> build_grid();
@@ -128,7 +132,6 @@ class RunPlanner {
   double coarse_error_ = 0, discretisation_j_ = 0;  // of a grid, the first as a share of the cost
   std::unique_ptr<UniformMotion> motion_;           // of a uniform run, where wanted
   std::vector<double> nodes_;
-  std::vector<double> fastest_nodes_;  // that the search for the fastest motion begins with
   std::unique_ptr<SpeedSolver> solver_;
   // The first of them, once there are finer ones, and its last solution.
   std::vector<double> rough_nodes_;

@@ -25,6 +25,7 @@ namespace joulecast::planning {
 // linearised, and multipliers keep a share of themselves in each step (19.9); a line search makes the barrier
 // function fall (3.4); an indefinite matrix is corrected along its diagonal (Waechter & Biegler, Math.
 // Program. 106 (2006), algorithm IC). mu falls by a factor (their (7)) when its problem is about solved.
+// Where a duration is due, the price of time is one more unknown, its equation one more row (follow_price).
 // Where the problem is convex, sum y_j s_j bounds the remaining decrease of F; it is reported as the gap.
 //
 // Where braking begins to return energy, F has terms half_jump |E|, E the energy of a motor in a cell. They
@@ -52,6 +53,8 @@ constexpr double finest_gap = 1e-9;       // no tolerance is less
 constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
 constexpr double quick_decrease = 0.05;   // after a full step with a decrement below the gap
 constexpr int most_iterations = 200;
+constexpr int most_settling =
+    3;  // steps where a kink's slope lags behind z; 1 leaves plans 9e-4 dearer, 8 is like it
 
 // Bounds of a cell: acceleration, positive and negative; ceiling and floor of its first node; of the motors.
 constexpr unsigned of_acceleration = 0, of_ceiling = 2, of_floor = 3, of_motors = 4;
@@ -90,8 +93,8 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   assert(n >= 2 && grid_.ceiling.size() == n + 1);
   set_return(grid_.electric.down);
   cells_.resize(n);
-  for (auto* v : {&z_, &trial_, &gradient_, &slope_, &stationarity_, &diagonal_, &off_, &magnitude_, &pivot_,
-                  &lower_, &step_})
+  for (auto* v : {&z_, &trial_, &gradient_, &slope_, &stationarity_, &by_price_, &diagonal_, &off_,
+                  &magnitude_, &pivot_, &lower_, &step_})
     v->assign(n + 1, 0);
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
@@ -393,13 +396,40 @@ bool SpeedSolver::factorise() {
   return true;
 }
 
-void SpeedSolver::solve_step() {
+void SpeedSolver::solve_step(const std::vector<double>& slope, std::vector<double>& step) const {
   const std::size_t n = grid_.cells();
-  step_[0] = step_[n] = 0;
-  step_[1] = -slope_[1];
-  for (std::size_t k = 2; k < n; ++k) step_[k] = -slope_[k] - lower_[k] * step_[k - 1];
-  step_[n - 1] /= pivot_[n - 1];
-  for (std::size_t k = n - 1; k-- > 1;) step_[k] = step_[k] / pivot_[k] - lower_[k + 1] * step_[k + 1];
+  step[0] = step[n] = 0;
+  step[1] = -slope[1];
+  for (std::size_t k = 2; k < n; ++k) step[k] = -slope[k] - lower_[k] * step[k - 1];
+  step[n - 1] /= pivot_[n - 1];
+  for (std::size_t k = n - 1; k-- > 1;) step[k] = step[k] / pivot_[k] - lower_[k + 1] * step[k + 1];
+}
+
+// Changes the price of time so that the linearised duration after the step is the one that is due: one more
+// unknown of Newton's method, whose row and column border the matrix. Returns how late z_ is.
+double SpeedSolver::follow_price(double due_s) {
+  const std::size_t n = grid_.cells();
+  std::vector<double>&by_z = by_price_, &response = trial_;  // of the duration, and of the step to the price
+  std::fill(by_z.begin(), by_z.end(), 0.0);
+  double duration = 0, after = 0, fall = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const Cell& c = cells_[k];
+    const double span = grid_.step[k] / c.v;
+    duration += span;
+    by_z[k] -= span / c.v * c.by_z0, by_z[k + 1] -= span / c.v * c.by_z1;
+  }
+  solve_step(by_z, response);
+  for (std::size_t k = 1; k < n; ++k) after += by_z[k] * step_[k], fall -= by_z[k] * response[k];
+  after += duration;
+  const double change = std::clamp((after - due_s) / fall, -0.5 * idle_, idle_);
+  idle_ += change;
+  cost_here_ += change * duration, merit_here_ += change * duration;
+  for (std::size_t k = 1; k < n; ++k) {
+    const double slope = change * by_z[k];
+    gradient_[k] += slope, slope_[k] += slope, stationarity_[k] += slope;
+    step_[k] += change * response[k];
+  }
+  return duration - due_s;
 }
 
 // Between the slowest and the fastest profile of the envelope, near the cruising speed that balances idle
@@ -567,7 +597,7 @@ double SpeedSolver::centre(double mu) {
       }
     }
     trial_ = step_;
-    solve_step();
+    solve_step(slope_, step_);
     const double length = step_to_boundary(), now = length * decrement();
     if (!(now > promised)) {
       step_ = trial_;
@@ -639,16 +669,17 @@ std::vector<double> SpeedSolver::costs_j(const std::vector<double>& z, double pr
   return costs;
 }
 
-SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop) {
+SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop,
+                                 const std::optional<Due>& due) {
   idle_ = grid_.electric.idle_w + price_w;
   // Where the price changes the cost by no more than a share of the gap, that barrier's profile is near.
   const auto nearest = std::find_if(way_.rbegin(), way_.rend(), [&](const Passed& p) {
-    return p.gap > price_share * std::fabs(idle_ / last_idle_ - 1);
+    return p.gap > price_share * (due ? 1 : std::fabs(idle_ / last_idle_ - 1));
   });
   double gap = first_gap_warm;
   if (!started_ && nearest != way_.rend()) z_ = nearest->z, gap = nearest->gap, started_ = true;
   SpeedSolution best;
-  if (started_) best = descend(price_w, gap, tolerance, stop);
+  if (started_) best = descend(price_w, gap, tolerance, stop, due);
   if (best.converged || stop.stop_requested() || !envelope().feasible) return best;
   std::vector<Passed> way;
   for (const std::optional<double> share : {std::optional<double>{}, {0.03}, {0.9}}) {
@@ -657,9 +688,9 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
     // Braking that costs makes power concave in the torque. Its convex hull, free braking, leads near the
     // global optimum.
     set_return(std::max(0.0, grid_.electric.down));
-    SpeedSolution found = descend(price_w, first_gap, tolerance, stop);
+    SpeedSolution found = descend(price_w, first_gap, tolerance, stop, due);
     set_return(grid_.electric.down);
-    if (grid_.electric.down < 0) found = descend(price_w, first_gap_warm, tolerance, stop);
+    if (grid_.electric.down < 0) found = descend(found.price_w, first_gap_warm, tolerance, stop, due);
     if (best.z.empty() || (found.converged && (!best.converged || found.cost_j < best.cost_j)))
       best = std::move(found), way = std::move(way_);
   }
@@ -669,20 +700,20 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
 }
 
 void SpeedSolver::finish(SpeedSolution& solution, double price_w) {
-  solution.z = z_;
+  solution.z = z_, solution.price_w = price_w;
   const std::vector<double> costs = costs_j(z_, price_w);
   solution.cost_j = std::accumulate(costs.begin(), costs.end(), 0.0);
   solution.duration_s = duration_of(grid_, z_);
 }
 
 // From z_, to the optimum near it.
-SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
-                                   const std::stop_token& stop) {
+SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance, const std::stop_token& stop,
+                                   const std::optional<Due>& due) {
   SpeedSolution solution;
+  idle_ = grid_.electric.idle_w + price_w;
   smoothing_ = torque_smoothing_ = 0;
   started_ = false;
   way_.clear();
-  last_idle_ = idle_;
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
   BarrierSchedule barrier(grid_, static_cast<double>(bound_states_.size()), std::fabs(merit(z_, 0)),
@@ -692,19 +723,24 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
   start_duals(barrier.mu());
   double damping = 0;
   bool corrected = false;
+  int settling = 0;
   for (int iteration = 0; iteration < most_iterations && !stop.stop_requested(); ++iteration) {
     solution.iterations = iteration + 1;
     assemble(barrier.mu());
     // Tolerances follow the cost as it falls, so that the answer does not depend on where the search began.
     barrier.follow(cost_here_);
     if (!regularise(damping, corrected)) break;
-    solve_step();
+    solve_step(slope_, step_);
+    const double late_s = due ? follow_price(due->duration_s) : 0;
+    if (due && idle_ > grid_.electric.idle_w + due->most_w) break;
     const double left = complementarity(), allowed = tolerance * barrier.scale();
-    if (barrier.at_finest() && left < 3 * allowed && decrement() < 0.3 * allowed) {
+    solution.residual = stationarity_residual() / barrier.scale();
+    if (barrier.at_finest() && left < 3 * allowed && decrement() < 0.3 * allowed &&
+        !(due && std::fabs(late_s) > tolerance * due->duration_s) &&
+        (solution.stationary() || ++settling > most_settling)) {
       solution.converged = true;
       solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
-      solution.residual = stationarity_residual() / barrier.scale();
       solution.convex = !scrubs_ && grid_.electric.down >= 0 && !corrected && damping == 0;
       break;
     }
@@ -724,8 +760,9 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     smooth();
   }
   if (!solution.converged) way_.clear();
+  last_idle_ = idle_;
   solution.binding = binding(barrier.scale() / static_cast<double>(bound_states_.size()));
-  finish(solution, price_w);
+  finish(solution, idle_ - grid_.electric.idle_w);
   return solution;
 }
 

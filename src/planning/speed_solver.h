@@ -17,6 +17,7 @@ namespace joulecast::planning {
 
 struct SpeedSolution {
   std::vector<double> z;
+  double price_w = 0;
   double cost_j = 0;  // motors, idle power and price of time, of the grid's midpoint rule
   double gap_j = 0;   // see Certificate
   // For each cell, the cost of enforcing motors' limits at its ends: at constant acceleration a motor is used
@@ -29,6 +30,13 @@ struct SpeedSolution {
   bool converged = false;
   int iterations = 0;
   std::array<bool, bound_count> binding{};
+
+  bool stationary() const { return residual < 5e-3; }  // relative to the cost
+};
+
+// The duration of a profile whose price of time is to be found, and the highest such price.
+struct Due {
+  double duration_s = 0, most_w = 0;
 };
 
 // Minimises sum of step * [(idle + price)/v + sum over motors of phi(P/v)] by a primal-dual interior point
@@ -44,10 +52,12 @@ class SpeedSolver {
   const SpeedEnvelope& envelope();
 
   // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
-  // earlier the more the price has changed. Where scrub makes the problem not convex, a first solve also
-  // starts slow and fast, and takes the cheapest result. Not converged when a stop is requested; the profile,
-  // if any, is feasible.
-  SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
+  // earlier the more the price has changed. With `due` the price is the first guess of one that is solved for
+  // together with the profile; not converged where it is dearer than allowed. Where scrub makes the problem
+  // not convex, a first solve also starts slow and fast, and takes the cheapest result. Not converged when a
+  // stop is requested; the profile, if any, is feasible.
+  SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {},
+                      const std::optional<Due>& due = {});
 
   // Cost of a profile by the grid's midpoint rule, of each cell.
   std::vector<double> costs_j(const std::vector<double>& z, double price_w);
@@ -125,13 +135,15 @@ class SpeedSolver {
   std::vector<double> initial_point(std::optional<double> share = {});
   void set_return(double down);
   void finish(SpeedSolution& solution, double price_w);
-  SpeedSolution descend(double price_w, double gap, double tolerance, const std::stop_token& stop);
+  SpeedSolution descend(double price_w, double gap, double tolerance, const std::stop_token& stop,
+                        const std::optional<Due>& due);
   void start_duals(double mu);
   Local local(std::size_t cell);
   void assemble(double mu);
   bool factorise();
   bool regularise(double damping, bool& corrected);
-  void solve_step();
+  void solve_step(const std::vector<double>& slope, std::vector<double>& step) const;
+  double follow_price(double due_s);
   double complementarity() const;
   std::vector<double> cost_of_ends() const;
   double stationarity_residual() const;
@@ -161,7 +173,8 @@ class SpeedSolver {
   double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
-  std::vector<double> gradient_, slope_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
+  std::vector<double> gradient_, slope_, stationarity_, by_price_, diagonal_, off_, magnitude_, pivot_,
+      lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
   bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given

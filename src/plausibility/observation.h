@@ -34,7 +34,8 @@ enum class Relation : std::size_t {
                  // the model has no braking
   idle,          // battery power, 1; standing
   motion,        // battery power, the model's, 1
-  sag,           // changes of the battery's voltage, of its current, from one cell to the next
+  sag,           // changes of the battery's voltage, of its current, from one cell to the next; the
+                 // latter again, or 0 unless the motors brake in both
   climb,         // battery power less the model's, m g v sin(pitch), 1
   gyro,          // yaw rate, w right, w left, 1
   way,           // speed of the robot by the wheels, its magnitude, 1
@@ -109,7 +110,7 @@ class Observer {
   std::optional<CellCutter> cells_;
   SpanCutter spans_;
   std::size_t cells_in_block_ = 0;
-  std::array<double, 2> battery_{};  // voltage and current of the last cell
+  std::array<double, 3> battery_{};  // voltage, current, power by the model without idling; of the last cell
   std::optional<signals::Sample> before_,
       waiting_;                // a spike is detected from the next sample
   signals::Sample known_;      // last measured position and yaw rate ...

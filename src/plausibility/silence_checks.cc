@@ -148,6 +148,25 @@ bool wheels_look_wrong(const CheckContext& c) {
                              [](const ChannelFault* f) { return f->channel.starts_with("wheel_velocity"); });
 }
 
+bool never_negative(const ValueTally& t) {
+  return !t.constant() && t.low() >= -noise_share * t.high();
+}
+
+// Detects a battery's current without a sign: a battery that is charged has a higher voltage.
+void check_unsigned_battery(const CheckContext& c, Checks& checks) {
+  const BlockFit fit = fit_blocks(c.blocks(Relation::sag), 0, {1, 2});
+  const Estimate driving = estimate(fit, 0), braking = estimate(fit, Eigen::Vector2d(1, 1));
+  if (!never_negative(c.tally(reading::battery_current)) || !driving.sure() || driving.value > 0 ||
+      !braking.sure() || braking.value < 0)
+    return;
+  const Estimate ratio = braking * (-1 / driving.value);
+  add_check(checks, "battery_current_unsigned", "battery_current", ratio, true,
+            "battery_current is never negative, and while the motors brake the battery's voltage rises with "
+            "it, {} times as much as it falls otherwise: its sign is lost; joulecast expects it positive "
+            "while discharging.",
+            with_interval(ratio));
+}
+
 // Detects currents or voltages that are positive in both directions of the wheel.
 void check_unsigned(const CheckContext& c, std::size_t first, Checks& checks) {
   const bool amps = first == reading::motor_current;
@@ -155,8 +174,7 @@ void check_unsigned(const CheckContext& c, std::size_t first, Checks& checks) {
   std::vector<std::string> sides;
   Estimate backward;
   for (std::size_t k : {0u, 1u}) {
-    const ValueTally& t = c.tally(first + k);
-    if (t.constant() || t.low() < -noise_share * t.high()) continue;
+    if (!never_negative(c.tally(first + k))) continue;
     const BlockFit fit = amps ? fit_blocks(c.blocks(of_side(Relation::torque_right, k)), 0, {1, 6})
                               : fit_blocks(c.blocks(of_side(Relation::armature_right, k)), 0, {3, 5});
     const Estimate forward = estimate(fit, Eigen::Vector2d(1, 1)),
@@ -200,6 +218,7 @@ void check_silence(const CheckContext& c, Checks& checks) {
   if (c.sum(&Observation::moving_s) < min_moving_s && witnesses.empty()) return;
   check_constant(c, witnesses, checks);
   check_battery_swap(c, checks);
+  check_unsigned_battery(c, checks);
   check_unsigned(c, reading::motor_current, checks);
   if (!check_supply(c, checks)) check_unsigned(c, reading::motor_voltage, checks);
 }

@@ -7,6 +7,7 @@
 #include <array>
 #include <boost/algorithm/string/replace.hpp>
 
+#include "base/text.h"
 #include "base/try.h"
 #include "base/utf8.h"
 
@@ -80,12 +81,6 @@ CsvFormat with_separator(std::string_view text, CsvFormat format) {
 }
 
 }  // namespace
-
-std::string_view trimmed(std::string_view text) noexcept {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
-  return text;
-}
 
 Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) {
   constexpr std::size_t probed = 65'536;  // bytes in which the separator is found

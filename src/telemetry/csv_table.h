@@ -20,9 +20,6 @@ struct CsvFormat {
   std::vector<std::string> header;  // names of the columns of a table without a header line
 };
 
-// Without the blanks and tabs around it.
-[[nodiscard]] std::string_view trimmed(std::string_view text) noexcept;
-
 // Reads a table row by row: any one-byte separator, RFC 4180 quotes (doubled inside), LF or CRLF, blank
 // lines, a byte order mark and Excel's line `sep=;` skipped. Text in UTF-16 or Latin-1 is converted to UTF-8;
 // else nothing but quoted fields is copied.

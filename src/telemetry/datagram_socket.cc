@@ -8,15 +8,14 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <cstring>
 #include <optional>
 #include <utility>
 
 #include "base/host_clock.h"
+#include "base/text.h"
 #include "base/try.h"
 
 namespace joulecast::telemetry {
@@ -36,24 +35,9 @@ std::optional<std::uint32_t> parse_address(std::string_view text) {
   return ntohl(address.s_addr);
 }
 
-template <class Number>
-std::optional<Number> parse_whole(std::string_view text) {
-  Number number{};
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (fault != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
-// The text up to the next `separator`, which `rest` loses.
-std::string_view next(std::string_view& rest, char separator) {
-  const std::string_view part = rest.substr(0, rest.find(separator));
-  rest.remove_prefix(std::min(rest.size(), part.size() + 1));
-  return part;
-}
-
 Result<void> read_option(UdpmUrl& parsed, std::string_view option) {
-  const std::string_view name = next(option, '=');
-  const std::optional<int> value = parse_whole<int>(option);
+  const std::string_view name = take_item(option, '=');
+  const std::optional<int> value = to_number<int>(option);
   if (name == "ttl") {
     if (!value || *value < 0 || *value > 255)
       return invalid("lcm.url", "ttl must be an integer from 0 to 255");
@@ -72,8 +56,8 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
   constexpr std::string_view scheme = "udpm://";
   if (!url.starts_with(scheme)) return invalid("lcm.url", "must begin with udpm://");
   std::string_view options = url.substr(scheme.size());
-  std::string_view network = next(options, '?');
-  const std::string_view host = next(network, ':');
+  std::string_view network = take_item(options, '?');
+  const std::string_view host = take_item(network, ':');
   UdpmUrl parsed{0xefff4c43, 7667, 0};  // 239.255.76.67
   if (!host.empty()) {
     const auto group = parse_address(host);
@@ -83,13 +67,13 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
     parsed.group = *group;
   }
   if (!network.empty()) {
-    const auto port = parse_whole<std::uint16_t>(network);
+    const auto port = to_number<std::uint16_t>(network);
     if (!port || *port == 0)
       return invalid("lcm.url", "'" + std::string(network) + "' is no port (1 to 65535)");
     parsed.port = *port;
   }
   while (!options.empty()) {
-    TRY(read_option(parsed, next(options, '&')));
+    TRY(read_option(parsed, take_item(options, '&')));
   }
   return parsed;
 }
@@ -97,9 +81,7 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
 Result<AcceptedSenders> AcceptedSenders::parse(std::string_view list) {
   AcceptedSenders accepted;
   while (!list.empty()) {
-    std::string_view entry = next(list, ',');
-    entry.remove_prefix(std::min(entry.find_first_not_of(' '), entry.size()));
-    entry = entry.substr(0, entry.find_last_not_of(' ') + 1);
+    std::string_view entry = trimmed(take_item(list, ','));
     if (entry == "local") {
       accepted.local_ = true;
       continue;
@@ -109,9 +91,9 @@ Result<AcceptedSenders> AcceptedSenders::parse(std::string_view list) {
       continue;
     }
     const std::string whole(entry);
-    const std::optional<std::uint32_t> address = parse_address(next(entry, '/'));
+    const std::optional<std::uint32_t> address = parse_address(take_item(entry, '/'));
     const std::optional<int> bits =
-        entry.empty() ? (whole.ends_with('/') ? std::nullopt : std::optional(32)) : parse_whole<int>(entry);
+        entry.empty() ? (whole.ends_with('/') ? std::nullopt : std::optional(32)) : to_number<int>(entry);
     if (!address || !bits || *bits < 0 || *bits > 32)
       return invalid(
           "lcm.accept_from",

@@ -1,8 +1,5 @@
 #include "telemetry/event_log.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <boost/endian/conversion.hpp>
@@ -41,28 +38,17 @@ struct Header {
   [[nodiscard]] std::size_t total() const noexcept { return log_header_size + channel_length + data_length; }
 };
 
-// A file descriptor that several copies of one Source may share.
-std::shared_ptr<const int> own(int descriptor) {
-  return {new int(descriptor), [](const int* held) {
-            ::close(*held);
-            delete held;
-          }};
-}
-
 }  // namespace
 
 Result<EventLogReader> EventLogReader::open(const std::string& path, LogLimits limits) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) {
+  std::FILE* const opened = std::fopen(path.c_str(), "rbe");
+  if (opened == nullptr)
     return fail(errno == ENOENT ? Fault::not_found : Fault::unavailable, path, std::strerror(errno));
-  }
   return EventLogReader(
-      [file = own(descriptor)](std::span<std::uint8_t> into) -> std::ptrdiff_t {
-        ssize_t got = 0;
-        do {
-          got = ::read(*file, into.data(), into.size());
-        } while (got < 0 && errno == EINTR);
-        return got;
+      [file = std::shared_ptr<std::FILE>(opened, std::fclose)](std::span<std::uint8_t> into) {
+        const std::size_t got = std::fread(into.data(), 1, into.size(), file.get());
+        return got == 0 && std::ferror(file.get()) != 0 ? std::ptrdiff_t{-1}
+                                                        : static_cast<std::ptrdiff_t>(got);
       },
       limits);
 }

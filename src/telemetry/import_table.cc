@@ -13,6 +13,7 @@
 #include <set>
 #include <span>
 
+#include "base/text.h"
 #include "base/try.h"
 
 namespace joulecast::telemetry {

@@ -170,9 +170,9 @@ TEST_F(WrongUse, SuggestsNearestOptionAndCommand) {
 }
 
 TEST_F(WrongUse, NamesExpectedArguments) {
-  EXPECT_THAT(told({"profile", "--robot"}), HasSubstr("--robot takes a FILE"));
+  EXPECT_THAT(told({"profile", "--robot"}), HasSubstr("--robot requires FILE"));
   EXPECT_THAT(told({"profile", "--robot", "a.json", "--length", "three"}),
-              HasSubstr("--length takes a NUMBER, not three"));
+              HasSubstr("--length requires NUMBER, not three"));
   EXPECT_THAT(told({"profile", "--robot", "a.json"}), HasSubstr("--length, --turn or --request"));
   EXPECT_THAT(told({"autonomy", "--robot", "a.json"}), HasSubstr("--charge"));
   EXPECT_THAT(told({"token", "create", "--days", "-1"}), HasSubstr("--days: must be 0 to 36500, not -1"));

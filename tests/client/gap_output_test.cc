@@ -61,7 +61,6 @@ TEST(GapOutput, PrintsSectionsInOrder) {
         "ratio = 0.410 ± 0.020",
         "to check: bearings",
         "covariate:cpu_load: probability 81\u00a0%",
-        "outside the catalogue: wheel_torque follows time",
         "power error on held-out data: robot file 20.5 %, this diagnosis 6.4 %, linear regression 11.5 %, "
         "noise floor 3.3 %",
         "the effects close 68 % of the gap",

@@ -100,6 +100,18 @@ TEST(RobotForecast, ScoresAreUnbiased) {
   EXPECT_LT(std::fabs(lean), 0.25);
 }
 
+// The only score of a robot with one mission is that of the model itself, whose error the mission has
+// removed: however far off the model was, it does not widen what is forecast afterwards.
+TEST(RobotForecast, FirstScoreDoesNotWidenIntervals) {
+  for (const double factor : {0.6, 0.8, 1.0, 1.3, 1.6}) {
+    MadeMissions made(7);
+    RobotForecast forecast(made.robot, made.drive);
+    forecast.learn(made.next(factor, 0.02, 0.05));
+    const ScoreDistribution& scores = forecast.forecaster()->track(Subject::stated_energy).scores;
+    EXPECT_NEAR(scores.deviation(), ScoreDistribution().deviation(), 0.1) << factor;
+  }
+}
+
 TEST(RobotForecast, SetsMissionsBeforeChangeAside) {
   MadeMissions made(3);
   RobotForecast forecast(made.robot, made.drive);

@@ -259,7 +259,8 @@ TEST(VirtualRobot, ReportsFallingLoadInWatts) {
   EXPECT_EQ(d.outside.like, "accessory_load");
   EXPECT_NEAR(d.outside.power_w[0], first_w * 5 / 6, 0.15 * first_w);
   EXPECT_NEAR(d.outside.power_w[1], first_w / 6, 0.15 * first_w);
-  EXPECT_NE(outside_words(d.outside).find("independent of motion that follows time"), std::string::npos);
+  EXPECT_NE(outside_words(d.outside).find("load independent of motion (probability "), std::string::npos);
+  EXPECT_NE(outside_words(d.outside).find(" follows time or place: from "), std::string::npos);
 }
 
 // Noise of 25 W that changes every second. These recordings do not rule out a gap.

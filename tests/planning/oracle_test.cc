@@ -245,6 +245,7 @@ INSTANTIATE_TEST_SUITE_P(LongRest, EffectsAgainstIpopt, ::testing::Range(1006, 1
 INSTANTIATE_TEST_SUITE_P(ThreeGears, EffectsAgainstIpopt, ::testing::Range(2003, 2006));
 INSTANTIATE_TEST_SUITE_P(LongGears, EffectsAgainstIpopt, ::testing::Range(2006, 2036));
 INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, ::testing::Range(100, 114));
+INSTANTIATE_TEST_SUITE_P(DeadlineWithinGridError, AgainstIpopt, ::testing::Values(117));
 INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, ::testing::Range(114, 150));
 
 }  // namespace

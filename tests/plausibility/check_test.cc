@@ -522,6 +522,32 @@ TEST(CheckContradictions, AcceptsRegenerationOnDescent) {
   }
 }
 
+// Braking charges the battery and raises its voltage, which a current without a sign contradicts.
+TEST(CheckContradictions, FindsRectifiedBatteryCurrent) {
+  const robot::RobotModel model = carrier();
+  for (const bool rectified : {false, true}) {
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> noise_v(0, 0.01);
+    const telemetry::Recording mission = made::mission(240, 20, [&](double t, signals::Sample& s) {
+      const made::Motion m = made::motion(t);
+      s.wheel_velocity_rad_s = m.speed;
+      const double radius_m = model.kinematics.wheel_radius_m;
+      const double speed = 0.5 * radius_m * (m.speed[0] + m.speed[1]);
+      const double slope = 0.5 * radius_m * (m.slope[0] + m.slope[1]);
+      s.payload_kg = 300;
+      const double current_a = (2 + (20 + model.total_mass_kg(s.payload_kg) * slope) * speed) / 24;
+      s.battery_voltage_v = 24 - 0.1 * current_a + noise_v(random);
+      s.battery_current_a = rectified ? std::fabs(current_a) : current_a;
+    });
+    const Observation seen = observe(mission, model, dynamics::DriveModel(model, {}));
+    const auto checks = check_contradictions({&seen, 1}, model);
+    const Check* found = find(checks, "battery_current_unsigned");
+    ASSERT_EQ(found != nullptr, rectified);
+    EXPECT_EQ(std::ranges::any_of(checks, &Check::contradicted), rectified);
+    EXPECT_NEAR(rectified ? found->value : 1, 1, 0.1);
+  }
+}
+
 // Only the battery's readings are delayed; the motors are measured too.
 TEST(CheckRecordings, MeasuresBatteryDelayAgainstMotors) {
   static const made::Robot robot = made::virtual_robot("amr", 33);

@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "base/text.h"
 #include "server/http/content_coding.h"
 #include "server/http/cors.h"
 #include "server/http/json_digits.h"
@@ -49,7 +50,7 @@ TEST(Digits, RoundingErrorIsHalfUnit) {
   for (int k = 0; k < 20'000; ++k) {
     const double number = mantissa(random) * std::pow(10, exponent(random));
     const std::string text = rounded(number_text(number), usual_digits);
-    const auto back = parse_number<double>(text);
+    const auto back = to_number<double>(text);
     ASSERT_TRUE(back) << text;
     EXPECT_LE(std::fabs(*back - number), 0.5000001e-9 * std::fabs(number)) << text;
     EXPECT_EQ(rounded(text, usual_digits), text);

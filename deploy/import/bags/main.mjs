@@ -1,4 +1,3 @@
-/* global LICENCES */
 // node bags.cjs REQUEST: REQUEST is JSON {bags, out, robot, mapping, robot_id} with names of files. Writes
 // the tables and a mapping of each recording into the folder `out`, and answer.json: {recordings: [{source,
 // table, mapping, lines}]} or {field, message}. node bags.cjs --licences prints the licences of the

@@ -104,7 +104,7 @@ export class Recording {
   warn(text) {
     this.warnings.push(text);
   }
-  put(name, type, receiptUs, message) {
+  put(name, _type, receiptUs, message) {
     const topic = this.topics.get(name);
     for (const part of message.transforms ?? [message]) {
       const { sec, nsec, nanosec } = part.header?.stamp ?? { sec: 0, nsec: 0 };

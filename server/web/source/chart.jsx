@@ -27,7 +27,7 @@ export function axis(label, more = {}) {
     grid: line,
     ticks: { ...line, size: 4 },
     border: { show: true, stroke: p.line, width: 1 },
-    values: (_, splits, index, space, step) =>
+    values: (_, splits, _index, _space, step) =>
       splits.map((v) => (v === null ? '' : fixed(v, decimals(step)))),
     ...more,
   };

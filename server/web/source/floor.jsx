@@ -281,7 +281,6 @@ export function FloorPath({
 }
 
 export function Legend({ scale, title, unit = 'W' }) {
-  const middle = (scale.low + scale.high) / 2;
   return (
     <div class="legend">
       <span class="legend-title">{title}</span>
@@ -292,7 +291,6 @@ export function Legend({ scale, title, unit = 'W' }) {
         {'\u00a0'}
         {unit}
       </span>
-      {scale.low < 0 && <span class="note">neutral at {digits(middle, 1)}</span>}
     </div>
   );
 }

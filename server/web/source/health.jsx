@@ -20,7 +20,7 @@ export function since(utimeUs) {
 }
 
 function telemetryOf(state) {
-  if (!state.has_model) return { level: 'bad', text: 'no model' };
+  if (!state.has_model) return { level: 'bad', text: 'no robot file' };
   if (state.live) return { level: 'good', text: 'live' };
   if (unheard(state)) return { level: 'none', text: 'no telemetry yet' };
   const text = (

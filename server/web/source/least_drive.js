@@ -69,7 +69,8 @@ export function drivenRuns(mission, trace, idlePowerW) {
     : found;
 }
 
-// The payload of each run as reported by the robot and used in the accounts; null if it is not stored.
+// The payload of each run as reported by the robot and used in the accounts; null if it is not stored or was
+// never reported.
 export async function payloadsOf(mission, runs, signal) {
   if (runs.length > mostAsked) return null;
   const samples = await Promise.all(
@@ -80,7 +81,8 @@ export async function payloadsOf(mission, runs, signal) {
       ),
     ),
   );
-  if (samples.some((sample) => sample.payload_kg.length === 0)) return null;
+  if (samples.some(({ payload_kg: [said] }) => said === undefined)) return null;
+  if (samples.every(({ payload_kg: [said] }) => said === null)) return null;
   let now = mission.payload_kg ?? 0;
   let named = false;
   return samples.map(({ payload_kg: [said] }) => {

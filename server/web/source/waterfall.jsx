@@ -85,7 +85,7 @@ function Closing({ sum, end, scale, closure, absent }) {
   const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
   return (
     <p class="closing">
-      Sum of the accounts <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
+      Sum of the terms <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
       {closure !== undefined &&
         (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.share(closure, 3)}.`)}
       {absent.length > 0 && <span class="note"> Negligible: {absent.join(', ')}.</span>}

@@ -162,10 +162,11 @@ export function Button({ needs, refusal = needs && refusalFor(needs), disabled, 
   return <button type="button" disabled={disabled || refusal !== undefined} title={refusal} {...more} />;
 }
 
+// `options`: {key: name}.
 export function Choice({ label, options, value, onChange }) {
   return (
     <div class="choice" role="group" aria-label={label}>
-      {options.map(([key, name]) => (
+      {Object.entries(options).map(([key, name]) => (
         <button key={key} type="button" aria-pressed={String(key === value)} onClick={() => onChange(key)}>
           {name}
         </button>

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "base/try.h"
 #include "gap/equations/power.h"
 #include "gap/posterior/constants.h"
-#include "statistics/robust.h"
 #include "statistics/updates.h"
 #include "windows/track.h"
 
@@ -15,32 +13,6 @@ namespace joulecast::gap::posterior {
 namespace {
 
 constexpr double few = 0.2;  // of the windows: a channel with fewer readings is not used
-
-// The samples of a mission with a fresh reading of battery power, and the averaging length.
-struct Fresh {
-  std::vector<std::size_t> at;
-  bool held = false;
-  double period_s = 0;
-};
-
-Fresh fresh_of(const windows::Track& c) {
-  Fresh fresh;
-  const statistics::Updates updates = statistics::find_updates(c.time_s, c.battery_current);
-  fresh.held = updates.held;
-  fresh.period_s = updates.period_s;
-  for (const std::size_t k : updates.at) {
-    if (std::isfinite(c.battery_power[k] + c.speed[0][k] + c.speed[1][k])) fresh.at.push_back(k);
-  }
-  return fresh;
-}
-
-double mean_known(const std::vector<double>& v, double otherwise) {
-  double sum = 0, n = 0;
-  for (const double x : v) {
-    if (std::isfinite(x)) sum += x, n += 1;
-  }
-  return n > 0 ? sum / n : otherwise;
-}
 
 // The motion at one sample.
 Window instant_at(const windows::Track& c, std::size_t k, double period_s) {
@@ -68,20 +40,23 @@ Window instant_at(const windows::Track& c, std::size_t k, double period_s) {
 
 void add_readings(const windows::Track& c, double period_s, double voltage_v, std::size_t mission,
                   double least_row_s, PowerRows& rows) {
-  const Fresh fresh = fresh_of(c);
+  statistics::Updates fresh = statistics::find_updates(c.time_s, c.battery_current);
+  std::vector<std::size_t>& at = fresh.at;
+  std::erase_if(
+      at, [&](std::size_t k) { return !std::isfinite(c.battery_power[k] + c.speed[0][k] + c.speed[1][k]); });
   const double length_s = fresh.held && least_row_s < fresh.period_s
                               ? 0
                               : std::max({row_s, row_readings * fresh.period_s, least_row_s});
   const auto row_of = [&](std::size_t n) {
-    return length_s > 0 ? std::floor(c.time_s[fresh.at[n]] / length_s) : static_cast<double>(n);
+    return length_s > 0 ? std::floor(c.time_s[at[n]] / length_s) : static_cast<double>(n);
   };
-  for (std::size_t n = 0; n < fresh.at.size();) {
+  for (std::size_t n = 0; n < at.size();) {
     std::size_t end = n;
     double sum = 0;
-    for (; end < fresh.at.size() && row_of(end) == row_of(n); ++end) sum += c.battery_power[fresh.at[end]];
+    for (; end < at.size() && row_of(end) == row_of(n); ++end) sum += c.battery_power[at[end]];
     const std::size_t count = end - n, instants = std::min(count, row_instants);
     for (std::size_t k = 0; k < instants; ++k) {
-      rows.instants.push_back(instant_at(c, fresh.at[n + (2 * k + 1) * count / (2 * instants)], period_s));
+      rows.instants.push_back(instant_at(c, at[n + (2 * k + 1) * count / (2 * instants)], period_s));
       rows.instants.back().mission = mission;
       rows.instants.back().battery_voltage_v = voltage_v;
     }
@@ -166,7 +141,8 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     total_s += length_s.back();
     tracks.push_back(
         windows::make_track(mission, robot, d.covariates, windows::median_period_s(mission), {}));
-    voltage_v.push_back(mean_known(tracks.back().battery_voltage, robot.battery.nominal_voltage_v));
+    const double mean_v = tracks.back().mean_battery_voltage_v;
+    voltage_v.push_back(std::isfinite(mean_v) ? mean_v : robot.battery.nominal_voltage_v);
   }
   for (Window& w : d.windows) {
     d.battery_voltage_v.push_back(w.battery_voltage_v);

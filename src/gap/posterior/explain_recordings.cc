@@ -123,8 +123,8 @@ class Explainer {
 
   void state_useless_function() {
     a_.reasons.push_back(fmt::format(
-        "a dependence on {} is not named: on held-out data its error is {:.1f} % of the power, that "
-        "of the effects {:.1f} %",
+        "a dependence on {} does not reduce the error on held-out data enough to be the verdict: {:.1f} % of "
+        "the power with it, {:.1f} % without",
         fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
         100 * a_.held_out.function_effects));
   }

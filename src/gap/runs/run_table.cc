@@ -1,13 +1,13 @@
 #include "gap/runs/run_table.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 #include <optional>
 #include <set>
 
 #include "base/bounds.h"
+#include "base/text.h"
 #include "base/try.h"
 #include "signals/covariates.h"
 #include "telemetry/csv_table.h"
@@ -76,19 +76,9 @@ struct Header {
   std::vector<std::pair<std::size_t, std::size_t>> covariates, labels;  // place, index in the set
 };
 
-std::string_view trimmed(std::string_view cell) {
-  while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
-  while (!cell.empty() && (cell.back() == ' ' || cell.back() == '\r')) cell.remove_suffix(1);
-  return cell;
-}
-
 // NaN for an empty cell; nothing for one that is no finite number.
 std::optional<double> number_in(std::string_view cell) {
-  if (cell.empty()) return MissionRun::absent;
-  double value = 0;
-  const auto [end, fault] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (fault != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
-  return value;
+  return cell.empty() ? MissionRun::absent : to_number<double>(cell);
 }
 
 bool given(double value) {

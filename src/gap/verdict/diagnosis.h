@@ -126,7 +126,10 @@ std::string_view name_of(PowerSource source);
 enum class Verdict { none, effects, outside, inconclusive, not_this_robot };
 inline constexpr std::array<std::string_view, 5> verdict_names{"none", "effects", "outside", "inconclusive",
                                                                "not_this_robot"};
+inline constexpr std::array<std::string_view, 5> verdict_titles{
+    "no gap", "effects found", "outside the catalogue", "inconclusive", "not this robot"};
 std::string_view name_of(Verdict verdict);
+std::string_view title_of(Verdict verdict);
 
 // Data of a report's plots; the report computes nothing.
 struct Figures {

@@ -308,6 +308,10 @@ const Table<Diagnosis>& diagnosis_table() {
               "none: no gap beyond noise; effects: the reported effects explain the gap; outside: a "
               "deviation that no effect of the catalogue describes; not_this_robot: the file belongs to "
               "another robot")
+          .word(
+              "verdict_title", [](const D& d) { return title_of(d.verdict); }, verdict_titles,
+              "the verdict in words")
+          .later()
           .number_or_null("verdict_probability", &D::verdict_probability,
                           "probability of the verdict, averaged over resampled blocks")
           .later()

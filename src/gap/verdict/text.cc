@@ -156,11 +156,13 @@ class Reasons {
 }  // namespace
 
 std::string outside_words(const Outside& o) {
+  const std::string probability = probability_text(o.probability);
   if (!o.like.empty() && o.power_w[0] != o.power_w[1])
-    return sentence(fmt::format("a load independent of motion that follows time or place: from {} W to {} W",
-                                brief(o.power_w[0]), brief(o.power_w[1])));
-  return sentence(
-      fmt::format("an unknown cause shows in {} and {}", channel_words(o.channel), follows_words(o.follows)));
+    return sentence(
+        fmt::format("a load independent of motion (probability {}) follows time or place: from {} W to {} W",
+                    probability, brief(o.power_w[0]), brief(o.power_w[1])));
+  return sentence(fmt::format("an unknown cause (probability {}) shows in {} and {}", probability,
+                              channel_words(o.channel), follows_words(o.follows)));
 }
 
 std::string earlier_words(const Diagnosis& earlier, std::string_view first_mission) {
@@ -174,8 +176,8 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
   return sentence(
       fmt::format("this result is for the missions from {} on, after the step; that of the {} missions "
                   "before it is {}{}{}",
-                  first_mission, earlier.missions, verdict_words(name_of(earlier.verdict)),
-                  found.empty() ? "" : ": ", enumerate(found)));
+                  first_mission, earlier.missions, title_of(earlier.verdict), found.empty() ? "" : ": ",
+                  enumerate(found)));
 }
 
 std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {

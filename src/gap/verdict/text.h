@@ -8,8 +8,8 @@
 // Sentences of a diagnosis, for the report, the page and the command line alike.
 namespace joulecast::gap {
 
-// Where a cause outside the catalogue is visible, the variable it follows and its size, where that is
-// significant.
+// The probability of a cause outside the catalogue, where it is visible, the variable it follows and its
+// size, where that is significant.
 std::string outside_words(const Outside& outside);
 
 // The result of the missions before a step between missions, to accompany a diagnosis from `first_mission`

@@ -48,13 +48,6 @@ int places_of(double deviation) {
   return std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 6);
 }
 
-std::string verdict_words(std::string_view verdict) {
-  if (verdict == "none") return "no gap";
-  if (verdict == "effects") return "effects found";
-  if (verdict == "outside") return "outside the catalogue";
-  return words_of(verdict);
-}
-
 std::string with_deviation(double value, double deviation, std::string_view unit) {
   std::string text;
   if (std::isfinite(deviation) && deviation > 0) {

@@ -14,8 +14,6 @@ std::string brief(double value, int digits = 3);
 std::string brief_range(double low, double high);
 // An id as text: "load rolling resistance", "the covariate cpu load".
 std::string words_of(std::string_view id);
-// The verdict of a diagnosis as the page and the glossary have it: "effects found".
-std::string verdict_words(std::string_view verdict);
 // Decimal places that leave a deviation above 0 two significant digits.
 int places_of(double deviation);
 // "0.0182 ± 0.0011", with the unit where there is one.

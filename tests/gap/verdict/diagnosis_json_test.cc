@@ -60,6 +60,7 @@ TEST(DiagnosisJson, ContainsEveryField) {
        {{"battery_power", {{"absolute_relative", 0.21}, {"noise_floor", 0.031}}},
         {"yaw_rate", {{"absolute_relative", 0.052}, {"noise_floor", nullptr}}}}},
       {"verdict", "effects"},
+      {"verdict_title", "effects found"},
       {"verdict_probability", 0.93},
       {"reasons", {"These data do not distinguish slope from grade."}},
       {"effects",

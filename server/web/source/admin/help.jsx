@@ -1,12 +1,11 @@
 // Explanations of the page's terms: the text of glossary.md.
-import { getText, useRead } from '../api.js';
+import glossary from '../glossary.md';
 import { Heading, useTitleOf } from '../widgets.jsx';
 
-const entriesOf = (glossary) =>
-  [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => [
-    term,
-    text.replaceAll(/\s+/g, ' ').replaceAll('`', ''),
-  ]);
+const terms = [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => [
+  term,
+  text.replaceAll(/\s+/g, ' '),
+]);
 
 const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
@@ -63,7 +62,6 @@ const Terms = ({ of }) => (
 
 export function Help() {
   useTitleOf('Help');
-  const glossary = useRead((signal) => getText('glossary.txt', 'text/plain', signal), 'glossary').value;
   return (
     <>
       <Heading title="Help" />
@@ -72,13 +70,12 @@ export function Help() {
       <Terms of={recipes} />
       <h2>Keys</h2>
       <p>
-        Every control is reached with Tab. In the charts of a mission the arrow keys move the cursor (with
-        Shift in larger steps), + zooms in and − zooms out. In the drawing of a path the arrow keys move the
-        cross, Enter adds a point and Backspace removes the last. On the map of the floor the arrow keys go
-        from square to square.
+        Tab reaches every control. In the charts of a mission the arrow keys move the cursor (with Shift in
+        larger steps), + zooms in and − zooms out. In the drawing of a path the arrow keys move the cross,
+        Enter adds a point and Backspace removes the last. On the map of Floor the arrow keys select a square.
       </p>
       <h2 id="glossary">Glossary</h2>
-      <Terms of={entriesOf(glossary?.text ?? '')} />
+      <Terms of={terms} />
     </>
   );
 }

@@ -155,11 +155,17 @@ function Review({ of, file }) {
         ]}
       />
       {missing.length > 0 && (
-        <p class="fault">
+        <p class="note foot">
           {format.count(missing.length, 'value is', 'values are')} missing:{' '}
           {missing
             .slice(0, 6)
-            .map((f) => f.field.slice(1).replaceAll('/', '.'))
+            .map((f) =>
+              f.field
+                .slice(1)
+                .split('/')
+                .map((key) => unitOf(key)[0])
+                .join(' '),
+            )
             .join(', ')}
           {missing.length > 6 && ' …'}
         </p>
@@ -308,7 +314,7 @@ function Form({ groups, id, stored, begun }) {
   const faulty = review === null || review.findings.some((f) => f.fault);
   const barred =
     refusalFor('admin') ??
-    (faulty ? 'The file has faults.' : undefined) ??
+    (faulty ? 'Values are missing or invalid.' : undefined) ??
     (!stored && known ? `There is a robot ${name} already.` : undefined) ??
     (stored && changes.length === 0 ? 'Nothing has changed.' : undefined);
   const save = () =>

@@ -41,11 +41,7 @@ function colourOf(state, needs) {
   return state.charging ? p.good : p.ink;
 }
 
-const layers = [
-  ['paths', 'Paths'],
-  ['zones', 'Zones'],
-  ['none', 'Robots only'],
-];
+const layers = { paths: 'Paths', zones: 'Zones', none: 'Robots only' };
 
 function zonesPath(ids) {
   if (ids.length === 0) return null;

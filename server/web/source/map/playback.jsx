@@ -14,11 +14,7 @@ import { MapCanvas } from './canvas.jsx';
 const tracePoints = 5000;
 const listed = 50;
 const frameMs = 50;
-const speeds = [
-  [1, '1 ×'],
-  [10, '10 ×'],
-  [60, '60 ×'],
-];
+const speeds = { 1: '1 ×', 10: '10 ×', 60: '60 ×' };
 const colours = ['measured', 'modelled'];
 
 // {mission, t: seconds since its start, rows: [x m, y m]} of a mission; null until it is read.
@@ -67,11 +63,14 @@ const columns = [
 ];
 
 function Player({ second, most, change }) {
-  const [speed, setSpeed] = useState(10);
+  const [speed, setSpeed] = useState('10');
   const [playing, setPlaying] = useState(false);
   useEffect(() => {
     if (!playing) return undefined;
-    const timer = setInterval(() => change((s) => Math.min(most, s + (speed * frameMs) / 1000)), frameMs);
+    const timer = setInterval(
+      () => change((s) => Math.min(most, s + (Number(speed) * frameMs) / 1000)),
+      frameMs,
+    );
     return () => clearInterval(timer);
   }, [playing, speed, most]);
   useEffect(() => {

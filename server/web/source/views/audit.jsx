@@ -5,10 +5,7 @@ import { Events, useEvents } from './events.jsx';
 import { Log, Requests } from './requests.jsx';
 
 const step = 200;
-const subjects = [
-  ['', 'Robots and models'],
-  ['requests', 'Requests'],
-];
+const subjects = { '': 'Robots and models', requests: 'Requests' };
 
 // Events of robots and their models, newest first.
 function RobotEvents({ given: { robot }, change }) {

@@ -63,21 +63,19 @@ export function BackTest({ test }) {
     .filter(([key]) => test.left_out[key] > 0)
     .map(([key, why]) => `${test.left_out[key]} ${why}`)
     .join(', ');
-  const falls = test.error_after < test.error_before;
   return (
     <>
       <div class={`verdict-box ${test.improves ? 'makes' : 'fails'}`}>
         <p class="verdict">
-          On {test.missions.length} missions that were not used for the fit, the energy error{' '}
-          {falls ? 'falls' : 'rises'} from <b>{share(test.error_before, 2)}</b> to{' '}
-          <b>{share(test.error_after, 2)}</b>.
+          On {format.count(test.missions.length, 'mission')} not used for the fit, the energy error changes
+          from <b>{share(test.error_before, 2)}</b> to <b>{share(test.error_after, 2)}</b>.
         </p>
         <p class="note">
-          Improvement {rangeOf(test.improvement_ci, 2)} (95 % interval). Power gap{' '}
+          Improvement {rangeOf(test.improvement_ci, 2)} (95 % interval). Gap in power{' '}
           {share(test.power_gap_before, 2)} before, {share(test.power_gap_after, 2)} after; it falls by{' '}
           {rangeOf(test.power_gap_fall_ci, 2)} (95 % interval).
           {format.known(test.voltage_gap_before) &&
-            ` Voltage gap ${share(test.voltage_gap_before, 2)} before, ${share(test.voltage_gap_after, 2)} after.`}{' '}
+            ` Error of changes of battery voltage ${share(test.voltage_gap_before, 2)} before, ${share(test.voltage_gap_after, 2)} after.`}{' '}
           Compared with model version {test.tested_against}.{left && ` Excluded: ${left}.`}
         </p>
       </div>

@@ -6,7 +6,7 @@ import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
 import { unitOf } from './changes.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
-import { chance, effectName, likelyNames, rangeOf, share, verdicts } from './jobs.jsx';
+import { chance, effectName, likelyNames, rangeOf, share, verdictTitle } from './jobs.jsx';
 
 const channels = {
   battery_power: 'battery power',
@@ -183,17 +183,25 @@ function Regression({ of }) {
   );
 }
 
+const verdictNotes = {
+  none: 'Measured and modelled energy agree, as far as these missions can show.',
+  effects: 'The model lacks the effects that are listed here.',
+  outside: 'No effect of the catalogue describes the cause.',
+  not_this_robot: 'The robot file does not match this robot.',
+  inconclusive: 'The cause of the gap cannot be determined from these missions.',
+};
+
 function Verdict({ result: r }) {
-  const [name, words] = verdicts[r.verdict] ?? [r.verdict, ''];
+  const name = verdictTitle(r);
   const effects = likelyNames(r);
   return (
     <div class={`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}>
       <p class="verdict">
-        <b>{name}</b>
+        <b>{name[0].toUpperCase() + name.slice(1)}</b>
         {effects && `${r.verdict === 'effects' ? ':' : '; most likely'} ${effects}`}
       </p>
       <p class="note">
-        {words} Probability of this verdict: {chance(r.verdict_probability)}.
+        {verdictNotes[r.verdict]} Probability of this verdict: {chance(r.verdict_probability)}.
       </p>
       <Texts of={r.reasons} />
     </div>

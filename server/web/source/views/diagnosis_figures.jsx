@@ -9,10 +9,7 @@ import { Choice, Key, Panel } from '../widgets.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 import { share } from './jobs.jsx';
 
-const states = [
-  ['before_w', 'Robot file'],
-  ['after_w', 'With the effects'],
-];
+const states = { before_w: 'Robot file', after_w: 'With the effects' };
 
 const rowsOf = (columns) =>
   Object.values(columns)[0].map((_, k) =>
@@ -181,9 +178,9 @@ const missionColumns = [
   figure('payload', 'Payload, kg', (m) => format.digits(m.payload_kg)),
   ...[
     ['energy_before', 'Gap in energy'],
-    ['energy_after', 'with the effects'],
+    ['energy_after', 'With the effects'],
     ['power_before', 'Gap in power'],
-    ['power_after', 'with the effects'],
+    ['power_after', 'With the effects'],
   ].map(([key, title]) => figure(key, title, (m) => share(m[key]))),
 ];
 

@@ -4,8 +4,14 @@ import * as format from '../format.js';
 import { useNewest } from '../logs.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column } from '../table.jsx';
+import { verdictTitle } from './jobs.jsx';
 
-const origins = { diagnosis: 'a diagnosis', proposal: 'a proposal', file: 'a robot file', http: 'an upload' };
+export const origins = {
+  diagnosis: 'a diagnosis',
+  proposal: 'a proposal',
+  file: 'a robot file',
+  http: 'an upload',
+};
 
 const kinds = {
   model_adopted: [
@@ -32,8 +38,7 @@ const kinds = {
   ],
   gap_diagnosed: [
     'Diagnosed',
-    (d) =>
-      `${format.words(d.verdict)}${d.effects?.length > 0 ? `: ${d.effects.map(format.words).join(', ')}` : ''}`,
+    (d) => `${verdictTitle(d)}${d.effects?.length > 0 ? `: ${d.effects.map(format.words).join(', ')}` : ''}`,
   ],
   proposal_dismissed: ['Proposal dismissed', (d) => d.reason],
   undeclared_payload: [

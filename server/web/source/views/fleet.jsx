@@ -100,7 +100,7 @@ const columns = [
 
 const filters = {
   all: ['All', () => true],
-  attention: ['Need attention', (s, needs) => needsSomeone(needs)],
+  attention: ['Need attention', (_, needs) => needsSomeone(needs)],
   live: ['Live', (s) => s.live],
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
@@ -110,6 +110,7 @@ const filters = {
     (s) => s.state_of_charge !== null && s.state_of_charge < lowCharge,
   ],
 };
+const filterNames = Object.fromEntries(Object.entries(filters).map(([key, [name]]) => [key, name]));
 
 const Row = ({ entry, index, ...more }) =>
   useMemo(
@@ -280,7 +281,7 @@ function QuietFold({ count, whole, onToggle }) {
   return (
     <p class="fold">
       <Button class="plain" aria-expanded={String(whole)} onClick={onToggle}>
-        {whole ? 'Hide' : 'Show'} {format.count(count, 'robot')} without telemetry yet
+        {whole ? 'Hide' : 'Show'} {format.count(count, 'robot')} without telemetry
       </Button>
     </p>
   );
@@ -338,7 +339,7 @@ export function Fleet({ given: asked }) {
           label="Show"
           value={only}
           onChange={(show) => change({ show: show === 'all' ? '' : show })}
-          options={Object.entries(filters).map(([key, [name]]) => [key, name])}
+          options={filterNames}
         />
         <SortChoice columns={columns} sort={sort} onSort={onSort} />
         <Button href="#/robot-file">Add a robot</Button>

@@ -58,11 +58,7 @@ const subjects = {
   }),
   time: () => ({ title: 'time spent', kind: 'power', unit: 'min', value: (c) => c.covered_s / 60 }),
 };
-const names = [
-  ['gap', 'Gap'],
-  ['energy', 'Energy'],
-  ['time', 'Time'],
-];
+const names = { gap: 'Gap', energy: 'Energy', time: 'Time' };
 
 // As finely as squares are.
 const place = (low, high, side) => {
@@ -192,7 +188,7 @@ function Shown({ map, show, stale }) {
     return (
       <Empty title="No positions recorded yet">
         {map.missions === 0
-          ? 'No mission started in this time.'
+          ? `No mission started in this period; by default it is the last ${usualDays} days.`
           : 'These robots do not report their position.'}
       </Empty>
     );
@@ -232,7 +228,7 @@ export function Floor({ given: asked }) {
   return (
     <>
       <h1 class="hidden">Floor</h1>
-      <Filters label="Data of the map">
+      <Filters label="Filter the map">
         <RobotsField {...field.of('robot')} none="the fleet" />
         {field.day('From', 'from')}
         {field.day('To', 'to')}

@@ -19,13 +19,8 @@ export const rangeOf = (ci, places = 1) =>
 export const effectName = (id) =>
   id.startsWith('covariate:') ? `covariate ${format.words(id.slice(10))}` : format.words(id);
 
-export const verdicts = {
-  none: ['No gap', 'Measured and modelled energy agree, as far as these missions can show.'],
-  effects: ['Effects found', 'The model lacks the effects that are listed here.'],
-  outside: ['Outside the catalogue', 'No effect of the catalogue describes the cause.'],
-  not_this_robot: ['Not this robot', 'The robot file does not match this robot.'],
-  inconclusive: ['Inconclusive', 'The cause of the gap cannot be determined from these missions.'],
-};
+// The verdict in words; diagnoses of earlier versions have only its id.
+export const verdictTitle = (of) => of.verdict_title ?? format.words(of.verdict);
 
 export function State({ of }) {
   return <span class={`job job-${of.state}`}>{stateNotes[of.state]}</span>;
@@ -41,7 +36,7 @@ export const likelyNames = ({ verdict, effects }) =>
 
 function foundWords(summary) {
   if (!summary) return '–';
-  const verdict = (verdicts[summary.verdict]?.[0] ?? summary.verdict).toLowerCase();
+  const verdict = verdictTitle(summary);
   const effects = likelyNames(summary);
   if (effects === '') return verdict;
   return summary.verdict === 'effects' ? effects : `${verdict}; most likely ${effects}`;

@@ -9,7 +9,7 @@ import { Empty, Failure, Loading } from '../widgets.jsx';
 function carriedNote(mission, payloads) {
   const kg = (value) => format.text(format.unit(value, 'kg'));
   if (payloads === null)
-    return `with the payload at the start, ${kg(mission.payload_kg ?? 0)}, on all legs; its changes were not read`;
+    return `payload at the start, ${kg(mission.payload_kg ?? 0)}, on all legs: later changes are unknown`;
   const [low, high] = [Math.min(...payloads), Math.max(...payloads)];
   return low === high
     ? `payload ${kg(low)}`

@@ -157,7 +157,7 @@ export function Mission({ id, given }) {
                 <Record mission={m} model={model} />
               </Panel>
               {m.findings && (
-                <Panel title="Payload by the motion">
+                <Panel title="Payload from the motion">
                   <Findings of={m.findings} mission={m} />
                 </Panel>
               )}

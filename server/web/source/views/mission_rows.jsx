@@ -11,28 +11,22 @@ export const sortNames = { consumption: 'wh_per_km' };
 
 function StateCell({ mission: m }) {
   const payload = m.findings?.payload;
+  const flag = (on, name, title) =>
+    on && (
+      <span class="flag" title={title}>
+        {name}
+      </span>
+    );
   return (
     <>
       <MissionState mission={m} />
-      {m.incomplete && (
-        <span class="flag" title={m.incomplete_reason ? format.words(m.incomplete_reason) : ''}>
-          incomplete
-        </span>
-      )}
-      {m.annulled && (
-        <span class="flag" title={m.annulled.reason}>
-          annulled
-        </span>
-      )}
-      {m.contradictions.length > 0 && (
-        <span class="flag" title={m.contradictions.map((c) => c.says).join(' ')}>
-          contradicted
-        </span>
-      )}
-      {payload?.verdict === 'undeclared' && (
-        <span class="flag" title="Difference from the declared payload, estimated from the motion">
-          {format.signed(format.digits(payload.undeclared_kg, 2))} kg payload
-        </span>
+      {flag(m.incomplete, 'incomplete', format.words(m.incomplete_reason ?? ''))}
+      {flag(m.annulled, 'annulled', m.annulled?.reason)}
+      {flag(m.contradictions.length > 0, 'contradicted', m.contradictions.map((c) => c.says).join(' '))}
+      {flag(
+        payload?.verdict === 'undeclared',
+        `${format.signed(format.digits(payload?.undeclared_kg, 2))} kg payload`,
+        'Difference from the declared payload, estimated from the motion',
       )}
     </>
   );

@@ -62,7 +62,7 @@ export function Motors({ mission, zoom }) {
   const window = zoom ? { from_utime_us: utime(from), to_utime_us: utime(to) } : {};
   const path = `/v1/missions/${mission.id}/telemetry${query({ ...window, limit: mostSamples })}`;
   const telemetry = useGet(shown && short ? path : null);
-  const options = Object.entries(quantities).map(([key, [name]]) => [key, name]);
+  const options = Object.fromEntries(Object.entries(quantities).map(([key, [name]]) => [key, name]));
   return (
     <Panel
       class="screen"

@@ -122,10 +122,7 @@ export function PlanForm({ given, robots, change, busy, fault, onCompute }) {
       <Choice
         label="How to give the path"
         {...field.of('way')}
-        options={[
-          ['legs', 'Enter legs'],
-          ['draw', 'Draw'],
-        ]}
+        options={{ legs: 'Enter legs', draw: 'Draw' }}
       />
       {given.way === 'legs' ? (
         <Legs legs={given.legs} change={(legs) => change({ legs })} fault={fault} />

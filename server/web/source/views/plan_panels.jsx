@@ -20,9 +20,9 @@ export function Certificate({ answer }) {
   const energies = [answer.braking_j, answer.recovered_j].map((joule) => format.text(energy(joule)));
   const rows = [
     ['Computed by', methods[c.method] ?? format.words(c.method)],
-    ['Above the optimum', above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.share(above)}`],
+    ['Excess over the optimum', above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.share(above)}`],
     ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
-    ['Cost of less time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
+    ['Cost of a shorter time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
     [
       'Shortest time',
       format.known(c.shortest_time_s)

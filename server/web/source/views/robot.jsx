@@ -102,7 +102,7 @@ function Now({ entry }) {
   return (
     <>
       <Readouts large rows={rows} />
-      {s.charge.limitation && <p class="note foot">Charge: {s.charge.limitation}</p>}
+      {s.charge.limitation && <p class="note foot">{s.charge.limitation}</p>}
     </>
   );
 }
@@ -165,8 +165,9 @@ function WithModel({ id, detail }) {
   if (detail.error?.status === 404)
     return (
       <Panel title="Model">
-        <Empty title="No model">
-          <a href={`#/robot-file${query({ robot: id })}`}>Add its robot file</a> to have its energy modelled.
+        <Empty title="No robot file">
+          <a href={`#/robot-file${query({ robot: id })}`}>Add its robot file</a> to record and model its
+          energy. Until then its telemetry is only counted.
         </Empty>
       </Panel>
     );

@@ -165,7 +165,7 @@ function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
   );
   const known = cursor !== null && cursor < trace.start_utime_us.length;
   const here = known ? lastAt(way.start_utime_us, trace.start_utime_us[cursor] + trace.width_us / 2) : null;
-  const options = [['power', 'Power'], ...(measured ? [['gap', 'Gap']] : [])];
+  const options = { power: 'Power', ...(measured && { gap: 'Gap' }) };
   const what = colouring === 'gap' ? 'measured minus modelled power' : 'power';
   return (
     <Panel
@@ -255,7 +255,7 @@ export function TracePanels({ mission, whole, fine, given }) {
           <Charts trace={trace} mission={mission} setZoom={setZoom} setCursor={setCursor} />
           <AtCursor trace={trace} mission={mission} index={cursor} />
           <p class="note foot">
-            Each point is {format.span(trace.width_us / 1e6)}
+            Each point covers {format.span(trace.width_us / 1e6)}
             {zoom !== null ? ', zoomed' : ''}.
           </p>
         </Panel>

@@ -29,12 +29,7 @@ import {
 } from './choosing.jsx';
 
 const defaultDays = { day: 30, week: 182 };
-const lasts = [
-  ['1', '24 h'],
-  ['7', '7 d'],
-  ['30', '30 d'],
-  ['182', '26 weeks'],
-];
+const lasts = { 1: '24 h', 7: '7 d', 30: '30 d', 182: '26 weeks' };
 const dayMs = 86_400_000;
 const fewest = 8; // periods that the time axis spans, so that the bar of a single one stays narrow
 const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
@@ -217,7 +212,7 @@ function Periods({ series, kind }) {
 }
 
 function Charts({ series, kind }) {
-  if (series.every((s) => s.groups.length === 0)) return <p class="note">No mission in this time.</p>;
+  if (series.every((s) => s.groups.length === 0)) return <p class="note">No mission in this period.</p>;
   const scale = energyScale(series.flatMap((s) => s.groups.map(joule)));
   const { u: perUnit } = consumption(1);
   const shown = [
@@ -376,14 +371,7 @@ function Fields({ given, change: set, kind, missions }) {
       {field.day('To', 'to')}
       {field.day('Compared from', 'from2')}
       {field.day('Compared to', 'to2')}
-      <Choice
-        label="Sums by"
-        {...field.of('by', kind)}
-        options={[
-          ['day', 'By day'],
-          ['week', 'By week'],
-        ]}
-      />
+      <Choice label="Sums by" {...field.of('by', kind)} options={{ day: 'By day', week: 'By week' }} />
     </>
   );
 }
@@ -410,14 +398,11 @@ export function Trends({ given: asked }) {
   return (
     <>
       <h1 class="hidden">Trends</h1>
-      <Filters label="Choose trends">
+      <Filters label="Filter trends">
         <Choice
           label="Of"
           {...fieldsOf(given, set).of('of', missions ? 'missions' : '')}
-          options={[
-            ['', 'Periods and robots'],
-            ['missions', 'Missions'],
-          ]}
+          options={{ '': 'Periods and robots', missions: 'Missions' }}
         />
         <Fields given={given} change={set} kind={kind} missions={missions} />
         {!missions && (

@@ -4,9 +4,8 @@ import * as format from '../format.js';
 import { Failure } from '../widgets.jsx';
 import { useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
+import { origins } from './events.jsx';
 import { share } from './jobs.jsx';
-
-const origins = { file: 'a robot file', http: 'an upload' };
 
 function Evidence({ of: { back_test: test, forced, diagnosis_id: id } }) {
   const tested =
@@ -34,7 +33,7 @@ function Version({ of: v, versions, robot, busy, onActivate }) {
       <p>
         <b>Version {number}</b> {v.active && <span class="flag calm">in force</span>}{' '}
         <span class="note">
-          {format.time(v.created_utime_us)} · from {origins[v.origin] ?? `a ${v.origin}`}
+          {format.time(v.created_utime_us)} · from {origins[v.origin] ?? format.words(v.origin)}
         </span>
       </p>
       {v.note && !v.evidence?.diagnosis_id && <p class="note">{v.note}</p>}
