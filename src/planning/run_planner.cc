@@ -19,12 +19,10 @@ namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
-// Relative to the cost: accuracy of the solution on a coarse and on a fine grid, and the greatest loss of its
-// cells.
+// Relative to the cost: accuracy of the solution on a coarse and on a fine grid.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
+// Relative to the cost, or to the shortest time: the greatest loss of the cells.
 constexpr double lost_tolerance = 8e-5;
-// Relative to the shortest time: the greatest loss of its cells.
-constexpr double time_tolerance = 1e-4;
 // The greatest number of refinements, and of cells relative to the first grid: not all losses fall with the
 // size of cells.
 constexpr int most_rounds = 3;
@@ -567,7 +565,7 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
     }
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
-    const double most_s = time_tolerance * s.duration_s;
+    const double most_s = lost_tolerance * s.duration_s;
     const std::vector<double> parts = least_parts(grid, nodes, s.z, round == 0 ? 2 : 1);
     fastest.nodes = nodes, fastest.solution = std::move(s);
     if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
