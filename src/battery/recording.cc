@@ -27,9 +27,7 @@ enum : std::size_t { time_column, current_column, voltage_column, temperature_co
 constexpr std::size_t required_columns = 3;
 
 std::string_view next_line(std::string_view& text) {
-  const std::size_t end = text.find('\n');
-  std::string_view line = text.substr(0, end);
-  text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  std::string_view line = take_item(text, '\n');
   if (line.ends_with('\r')) line.remove_suffix(1);
   return line;
 }

@@ -53,8 +53,8 @@ constexpr double finest_gap = 1e-9;       // no tolerance is less
 constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
 constexpr double quick_decrease = 0.05;   // after a full step with a decrement below the gap
 constexpr int most_iterations = 200;
-constexpr int most_settling =
-    3;  // steps where a kink's slope lags behind z; 1 leaves plans 9e-4 dearer, 8 is like it
+// Steps where a kink's slope lags behind z; 1 leaves plans 9e-4 dearer, 8 is like it.
+constexpr int most_settling = 3;
 
 // Bounds of a cell: acceleration, positive and negative; ceiling and floor of its first node; of the motors.
 constexpr unsigned of_acceleration = 0, of_ceiling = 2, of_floor = 3, of_motors = 4;
