@@ -50,7 +50,8 @@ std::vector<double> lost_at_corners_s(const SpeedGrid& grid, const std::vector<d
 // Time that the fastest profile loses in each cell since motors are used fully at one of its ends only [s]:
 // half of the difference, at the time that a change of the limit is worth there. It changes the far node's z
 // and those that follow: onwards where limits hold the acceleration, backwards where they hold the braking.
-std::vector<double> lost_at_ends_s(const SpeedGrid& grid, const std::vector<double>& z) {
+std::vector<double> lost_at_ends_s(const SpeedGrid& grid, const std::vector<double>& z,
+                                   const std::vector<MotorUse>& uses) {
   const std::size_t n = grid.cells();
   std::vector<double> worth_s(n + 1, 0), lost(n, 0);  // of a node's z
   for (std::size_t k = 0; k < n; ++k) {
@@ -61,22 +62,20 @@ std::vector<double> lost_at_ends_s(const SpeedGrid& grid, const std::vector<doub
   }
   for (const bool braking : {false, true}) {
     std::vector<double> worth = worth_s;
+    const auto share = [&](const MotorUse& use) { return braking ? use.slowing : use.rising; };
     for (std::size_t i = 0; i < n; ++i) {
       const std::size_t k = braking ? i : n - 1 - i, far = braking ? k : k + 1, near = braking ? k + 1 : k;
-      const double sign = braking ? -1 : 1;
-      // The share of the limits that a cell uses, with one of its nodes moved.
-      const auto share = [&](double by_near, double by_far) {
-        const double z0 = z[k] + (braking ? by_far : by_near), z1 = z[k + 1] + (braking ? by_near : by_far);
-        const MotorUse use = motor_use(grid, k, z0, z1);
-        return std::max(braking ? use.slowing : use.rising,
-                        sign * (z1 - z0) / (2 * grid.step[k] * grid.acceleration_limit));
-      };
-      const double here = share(0, 0), little = 1e-6 * std::max(z[k], z[k + 1]);
-      if (here < at_limit) continue;
-      const double by_far = (share(0, little) - here) / little, by_near = (share(little, 0) - here) / little;
+      const double little = 1e-6 * std::max(z[k], z[k + 1]), here = share(uses[k]);
+      if (here < at_limit) {
+        if (z[far] - z[near] > at_limit * 2 * grid.step[k] * grid.acceleration_limit)
+          worth[near] += worth[far];
+        continue;
+      }
+      const double by_0 = share(motor_use(grid, k, z[k] + little, z[k + 1])) - here,
+                   by_1 = share(motor_use(grid, k, z[k], z[k + 1] + little)) - here,
+                   by_far = braking ? by_0 : by_1, by_near = braking ? by_1 : by_0;
       if (!(by_far > 0)) continue;
-      const MotorUse use = motor_use(grid, k, z[k], z[k + 1]);
-      if (use.most() > at_limit) lost[k] = use.uneven / by_far * worth[far];
+      lost[k] = uses[k].uneven * little / by_far * worth[far];
       worth[near] += std::max(0.0, -by_near / by_far) * worth[far];
     }
   }
@@ -565,23 +564,24 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
   if (fastest_) return *fastest_;
   FastMotion fastest;
   std::vector<double> nodes = rough_solver_ ? rough_nodes_ : nodes_;
-  for (int round = 0; round <= most_rounds; ++round) {
-    const SpeedGrid grid = grid_over(nodes);
-    const SpeedEnvelope e = speed_envelope(grid);
-    if (round > 0 && !e.feasible) break;
+  SpeedSolver& first = rough_solver_ ? *rough_solver_ : *solver_;
+  SpeedGrid grid = first.grid();
+  SpeedEnvelope e = first.envelope();
+  for (int round = 0; round == 0 || (round <= most_rounds && e.feasible); ++round) {
     SpeedSolution s;
     s.z = e.fastest, s.duration_s = e.shortest_s;
     const auto binds = [&](Bound bound, double share) {
       s.binding[static_cast<std::size_t>(bound)] |= share > at_limit;
     };
+    std::vector<MotorUse> uses;
     for (std::size_t k = 0; k < grid.cells(); ++k) {
-      const MotorUse use = motor_use(grid, k, s.z[k], s.z[k + 1]);
+      const MotorUse& use = uses.emplace_back(motor_use(grid, k, s.z[k], s.z[k + 1]));
       if (k > 0) binds(Bound::speed, s.z[k] / grid.ceiling[k]);
       binds(Bound::acceleration,
             std::fabs(s.z[k + 1] - s.z[k]) / (2 * grid.step[k] * grid.acceleration_limit));
       binds(Bound::current, use.current), binds(Bound::voltage, use.voltage);
     }
-    std::vector<double> lost_s = lost_at_ends_s(grid, s.z);
+    std::vector<double> lost_s = lost_at_ends_s(grid, s.z, uses);
     // The first and the last cell could hold the faster of their ends' speeds but for the acceleration.
     for (const std::size_t k : {std::size_t{0}, grid.cells() - 1}) {
       if (lost_s[k] > 0) continue;
@@ -596,6 +596,7 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
     fastest = {std::move(nodes), std::move(s)};
     if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
     nodes = split(fastest.nodes, lost_s, 0.8 * most_s, parts);
+    grid = grid_over(nodes), e = speed_envelope(grid);
   }
   return fastest_.emplace(std::move(fastest));
 }
