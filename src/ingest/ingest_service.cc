@@ -12,6 +12,9 @@
 namespace joulecast::ingest {
 namespace {
 
+// Messages that come meanwhile are received with one wake-up. At 60,000 a second, with which the daemon's CPU
+// time is 16.1 us a message at 0, 12.0 at 0.3, 13.0 at 1 and 11.2 at 3 ms.
+constexpr std::chrono::milliseconds gather{1};
 constexpr std::int64_t live_us = 5'000'000;  // a robot not received from for longer publishes no energy state
 
 }  // namespace
@@ -115,6 +118,7 @@ void IngestService::receive() {
     }
     batch_.clear();
     report_dropped(dropped);
+    std::this_thread::sleep_for(gather);
   }
 }
 
@@ -156,9 +160,8 @@ void IngestService::account() {
     survive("accounting", [&] { pipeline_.follow_orders(); });
     // Robot by robot, as the states of hundreds of robots exceed the processor's caches.
     for (const InboundMessage& message : work) ordered.push_back(&message);
-    std::ranges::stable_sort(ordered, {}, [](const InboundMessage* message) -> const std::string& {
-      return message->robot_id;
-    });
+    std::ranges::stable_sort(
+        ordered, {}, [](const InboundMessage* message) -> const std::string& { return message->robot_id; });
     for (const InboundMessage* message : ordered) survive("accounting", [&] { pipeline_.handle(*message); });
     ordered.clear();
     work.clear();

@@ -13,6 +13,7 @@ import os
 import re
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 import urllib.request
@@ -92,15 +93,17 @@ def main():
         finally:
             daemon.terminate()
             daemon.wait()
-    received = after["joulecast_ingest_messages_total"] - before["joulecast_ingest_messages_total"]
-    samples = after["joulecast_ingest_samples_total"] - before["joulecast_ingest_samples_total"]
-    missing = after['joulecast_ingest_faults_total{reason="missing"}'] - before['joulecast_ingest_faults_total{reason="missing"}']
-    print(f"messages received {received:.0f} in {wall:.1f} s ({received / wall:.0f} a second), samples {samples:.0f}, missing {missing:.0f}")
+    grown = {name: count - before.get(name, 0) for name, count in after.items()}
+    received = grown["joulecast_ingest_messages_total"]
+    lost = sum(grown[f'joulecast_ingest_faults_total{{reason="{reason}"}}'] for reason in ("missing", "queue_full"))
+    print(f"messages received {received:.0f} in {wall:.1f} s ({received / wall:.0f} a second), "
+          f"samples {grown['joulecast_ingest_samples_total']:.0f}, lost or left out {lost:.0f}")
     whole = sum(map(sum, spent.values()))
     print(f"daemon: {100 * whole / wall:.0f} % of one core, {1e6 * whole / received:.2f} us a message")
     for thread, used in sorted(spent.items(), key=lambda each: -sum(each[1])):
         if sum(used) >= 0.002 * whole:
             print(f"  thread {thread}: {1e6 * sum(used) / received:6.2f} us, in the kernel {1e6 * used[1] / received:.2f}")
+    return 1 if lost else 0
 
 
 def seed_robots(options, lcm, port):
@@ -110,4 +113,4 @@ def seed_robots(options, lcm, port):
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

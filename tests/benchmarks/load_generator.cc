@@ -1,9 +1,10 @@
-// Load of daemon_load.py, cheap enough to share two cores with the daemon, and paced by sleeping to a schedule
-// that it catches up with after a delay.
+// Load of daemon_load.py, cheap enough to share two cores with the daemon, and paced by sleeping to a
+// schedule that it catches up with after a delay.
 //   load_generator send LOG LCM_PORT RATE
 // sends the messages of an LCM event log to 239.255.76.67 as LCM's datagrams;
 //   load_generator ask HTTP_PORT RATE SECONDS ROBOT MISSION
-// asks for a profile and for a mission alternately. Both print their own CPU time for each message or request.
+// asks for a profile and for a mission alternately. Both print their own CPU time for each message or
+// request.
 #include <arpa/inet.h>
 #include <sys/socket.h>
 
@@ -114,8 +115,8 @@ int send(const std::string& log, std::uint16_t port, double rate_1_s) {
   };
   if (!telemetry::read_events(log, take, tally)) give_up(log.c_str());
   sender.send();
-  std::printf("sent %u messages in %.1f s: %.0f a second, %.2f us each\n", sender.sent(), schedule.elapsed_s(),
-              sender.sent() / schedule.elapsed_s(), 1e6 * cpu_s() / sender.sent());
+  std::printf("sent %u messages in %.1f s: %.0f a second, %.2f us each\n", sender.sent(),
+              schedule.elapsed_s(), sender.sent() / schedule.elapsed_s(), 1e6 * cpu_s() / sender.sent());
   return 0;
 }
 
@@ -165,6 +166,7 @@ int main(int count, char** arguments) {
   if (what == "ask" && count == 7)
     return ask(port_of(arguments[2]), std::atof(arguments[3]), std::atof(arguments[4]), arguments[5],
                arguments[6]);
-  std::fputs("usage: load_generator send LOG LCM_PORT RATE | ask HTTP_PORT RATE SECONDS ROBOT MISSION\n", stderr);
+  std::fputs("usage: load_generator send LOG LCM_PORT RATE | ask HTTP_PORT RATE SECONDS ROBOT MISSION\n",
+             stderr);
   return 2;
 }
