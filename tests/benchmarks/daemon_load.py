@@ -3,8 +3,8 @@
 
   daemon_load.py --daemon joulecastd --client joulecast --generator load_generator [--rate 20000] [--seconds 60] [--requests 1000]
 
-Publishes telemetry of many robots in real time at a fixed rate, bounded in count and time, from a log written beforehand, and asks
-for profiles and a mission meanwhile. No message may be lost according to the daemon's counters. Reports the load, its own cost, and
+Publishes telemetry of many robots in real time at a fixed rate, bounded in count and time, from a log written beforehand, and requests
+profiles and a mission meanwhile. No message may be lost according to the daemon's counters. Reports the load, its own cost, and
 the daemon's CPU time by thread. Needs multicast on loopback.
 """
 import argparse
@@ -82,7 +82,7 @@ def main():
             time.sleep(1)
             robot = json.loads(get(port, "/v1/robots"))["robots"][0]["robot_id"]
             mission = json.loads(get(port, "/v1/missions?limit=1"))["missions"][0]["id"]
-            subprocess.run([options.generator, "ask", str(port), str(options.requests), str(options.seconds - 2), robot, str(mission)],
+            subprocess.run([options.generator, "request", str(port), str(options.requests), str(options.seconds - 2), robot, str(mission)],
                            check=True)
             assert sender.wait() == 0
             wall = time.monotonic() - began

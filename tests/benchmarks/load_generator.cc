@@ -2,8 +2,8 @@
 // schedule that it catches up with after a delay.
 //   load_generator send LOG LCM_PORT RATE
 // sends the messages of an LCM event log to 239.255.76.67 as LCM's datagrams;
-//   load_generator ask HTTP_PORT RATE SECONDS ROBOT MISSION
-// asks for a profile and for a mission alternately. Both print their own CPU time for each message or
+//   load_generator request HTTP_PORT RATE SECONDS ROBOT MISSION
+// requests a profile and a mission alternately. Both print their own CPU time for each message or
 // request.
 #include <arpa/inet.h>
 #include <sys/socket.h>
@@ -129,8 +129,8 @@ void print_times(const char* name, std::vector<double>& times_ms) {
               at(0.99), at(1));
 }
 
-int ask(std::uint16_t port, double rate_1_s, double seconds, const std::string& robot,
-        const std::string& mission) {
+int request(std::uint16_t port, double rate_1_s, double seconds, const std::string& robot,
+            const std::string& mission) {
   const std::string profile = http_request_text("/v1/robots/" + robot + "/profile",
                                                 R"({"path":[{"kind":"straight","length_m":10}]})");
   const std::string summary = http_request_text("/v1/missions/" + mission);
@@ -163,10 +163,10 @@ int main(int count, char** arguments) {
   using namespace joulecast::benchmarks;
   const std::string what = count > 1 ? arguments[1] : "";
   if (what == "send" && count == 5) return send(arguments[2], port_of(arguments[3]), std::atof(arguments[4]));
-  if (what == "ask" && count == 7)
-    return ask(port_of(arguments[2]), std::atof(arguments[3]), std::atof(arguments[4]), arguments[5],
-               arguments[6]);
-  std::fputs("usage: load_generator send LOG LCM_PORT RATE | ask HTTP_PORT RATE SECONDS ROBOT MISSION\n",
+  if (what == "request" && count == 7)
+    return request(port_of(arguments[2]), std::atof(arguments[3]), std::atof(arguments[4]), arguments[5],
+                   arguments[6]);
+  std::fputs("usage: load_generator send LOG LCM_PORT RATE | request HTTP_PORT RATE SECONDS ROBOT MISSION\n",
              stderr);
   return 2;
 }
