@@ -61,7 +61,7 @@ struct Correction {
 // beyond that: first payloads took 3.1 % more than their median forecast without, 1.4 % with 0.3 and 0.2 %
 // with 0.5. Of its durations, 5 % of driving, turning and speed and 2 % of payload: after 30 missions 100
 // robots of an independent plant and 24 virtual ones have learned factors whose root mean squares are at most
-// 0.04, 0.03, 0.05 and 0.02. Their drives are as long as planned or usual, whatever they carry.
+// 0.04, 0.03, 0.05 and 0.02. Their drives are as long as planned or usual, with any payload.
 Correction untried(Subject subject);
 
 // Each factor's prior is a t distribution of 5 degrees of freedom, which far evidence overrules: a normal one

@@ -280,7 +280,7 @@ TEST(RobotForecast, FirstPayloadsWidenIntervals) {
   EXPECT_GT(width(full_kg), 1.5 * width(0.3 * full_kg));
 }
 
-// A robot that has followed one plan exactly takes as long for another, whatever it carries.
+// A robot that has followed one plan exactly takes as long for another, with any payload.
 TEST(RobotForecast, FirstPlansLastAsStated) {
   MadeMissions made(14);
   RobotForecast forecast(made.robot, made.drive);
