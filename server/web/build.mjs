@@ -1,6 +1,6 @@
 // Bundles source/ into the files that joulecastd embeds. With --check: fails when they are not what the
 // sources give. With --watch: bundles again on every change.
-import { build, context } from 'esbuild';
+import { build, context } from 'esbuild-wasm';
 import { readFile, writeFile } from 'node:fs/promises';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
