@@ -205,12 +205,8 @@ void print(const Findings& findings) {
                                help_width(), 8));
   }
   if (findings.empty()) return fmt::print("no problems found\n");
-  const auto told = [](std::ptrdiff_t count, const char* what) {
-    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-  };
-  const auto faults = std::ranges::count_if(findings, &Finding::fault);
-  const auto warnings = static_cast<std::ptrdiff_t>(findings.size()) - faults;
-  fmt::print("{}, {}\n", told(faults, "fault"), told(warnings, "warning"));
+  const auto faults = static_cast<std::size_t>(std::ranges::count_if(findings, &Finding::fault));
+  fmt::print("{}, {}\n", count_of(faults, "fault"), count_of(findings.size() - faults, "warning"));
 }
 
 Exit exit_of(const Findings& findings) {
