@@ -136,7 +136,7 @@ Result<Discharge> discharge(const Circuit& circuit, const State& start, const Lo
                             const DischargeLimits& limits) {
   if (!finite(start)) return invalid("start", "has a number that is not finite");
   Problem problem(circuit, limits, load.kind);
-  energy::Cvode cvode(size, energy::Method::adams, problem);
+  energy::Cvode cvode(size, problem);
   const std::span<double> y = cvode.state();
   std::fill(y.begin(), y.end(), 0.0);
   y[charge_at] = start.charge;
