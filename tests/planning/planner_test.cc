@@ -7,6 +7,7 @@
 #include "planning/cost_table.h"
 #include "planning/line.h"
 #include "tests/planning/robots.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::planning {
 namespace {
