@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <map>
 #include <mutex>
-#include <utility>
 
 namespace joulecast {
 namespace {

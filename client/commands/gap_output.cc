@@ -11,7 +11,6 @@
 #include "base/host_clock.h"
 #include "base/json_number.h"
 #include "base/utc_time.h"
-#include "client/commands/print.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"

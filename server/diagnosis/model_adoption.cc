@@ -7,7 +7,6 @@
 
 #include "answers/json/mission_json.h"
 #include "base/try.h"
-#include "energy/back_test.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {

@@ -10,7 +10,6 @@
 #include "history/postgres.h"
 #include "history/schema.h"
 #include "history/sql_store.h"
-#include "history/sqlite.h"
 
 namespace joulecast::history {
 namespace {

@@ -9,7 +9,6 @@
 #include <numbers>
 #include <numeric>
 #include <span>
-#include <string>
 #include <utility>
 
 #include "base/median.h"

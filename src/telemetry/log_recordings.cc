@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -13,7 +12,6 @@
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
 #include "telemetry/datagram.h"
-#include "telemetry/event_log.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/validation.h"
 

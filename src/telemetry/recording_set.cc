@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "telemetry/log_recordings.h"
 
 namespace joulecast::telemetry {
 namespace {
