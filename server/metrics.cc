@@ -44,10 +44,6 @@ void Gauge::set(double value) const {
   if (gauge_ != nullptr) gauge_->Set(value);
 }
 
-void Gauge::add(double amount) const {
-  if (gauge_ != nullptr) gauge_->Increment(amount);
-}
-
 void Histogram::observe(double value) const {
   if (histogram_ != nullptr) histogram_->Observe(value);
 }

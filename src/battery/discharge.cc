@@ -175,12 +175,6 @@ Result<Discharge> discharge(const Circuit& circuit, const State& start, const Lo
   return out;
 }
 
-double Load::duration_s() const {
-  double total = 0;
-  for (const Piece& piece : pieces) total += piece.duration_s;
-  return total;
-}
-
 Result<Load> held_load(Load::Kind kind, std::span<const double> time_s, std::span<const double> value) {
   TRY(check(time_s, value));
   Load load{kind, {}};

@@ -61,7 +61,6 @@ class ClimbTracker {
  public:
   // Readings in order of time; a gap restarts the window.
   double add(const ClimbReading& reading);
-  void reset();
 
  private:
   void learn(double step_m);

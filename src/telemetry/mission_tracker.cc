@@ -5,11 +5,6 @@
 
 namespace joulecast::telemetry {
 
-std::string_view name_of(MissionEnd end) noexcept {
-  constexpr std::string_view names[] = {"finished", "aborted", "superseded", "unfinished", "idle", "expired"};
-  return names[static_cast<std::size_t>(end)];
-}
-
 SampleStep MissionTracker::on_sample(std::int64_t utime_us, double payload_kg) {
   SampleStep step;
   if (current_) close_if_over(step.actions, utime_us);

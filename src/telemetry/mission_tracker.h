@@ -33,8 +33,6 @@ enum class MissionEnd {
   expired      // an implicit mission that reached its longest duration
 };
 
-[[nodiscard]] std::string_view name_of(MissionEnd end) noexcept;
-
 struct OpenMission {
   std::string mission_id;
   std::int64_t start_utime_us = 0;
