@@ -160,7 +160,6 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
 
 void MissionTracker::open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
                           std::string note) {
-  ++counters_.opened_explicit;
   begin_us_ = utime_us;
   current_ = OpenMission{id, utime_us, utime_us, payload_kg, false};
   actions.push_back(

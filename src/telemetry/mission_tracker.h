@@ -62,7 +62,6 @@ struct SampleStep {
 };
 
 struct MissionCounters {
-  std::uint64_t opened_explicit = 0;
   std::uint64_t opened_implicit = 0;
   std::uint64_t closed = 0;
   std::uint64_t duplicate_events = 0;     // of a start or an end that was received already
