@@ -92,8 +92,7 @@ async function products() {
   const files = new Map(
     outputFiles.map((file) => [inAll(path.basename(file.path)), Buffer.from(inAll(file.text))]),
   );
-  for (const name of ['index.html', 'favicon.svg'])
-    files.set(name, await readFile(path.join(here, name)));
+  for (const name of ['index.html', 'favicon.svg']) files.set(name, await readFile(path.join(here, name)));
   files.set('third_party.txt', Buffer.from(await thirdParty()));
   files.set('report.template', Buffer.from(await reportTemplate()));
   return files;
