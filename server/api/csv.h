@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,7 +24,6 @@ class Csv {
   Csv& exact(double number);  // all digits, for raw data
   Csv& field(std::int64_t number);
   Csv& field(bool truth);
-  Csv& field(std::optional<std::int64_t> number) { return number ? field(*number) : field(""); }
   void end_row();
   // A row of an item's JSON. Null is an empty field, texts of an array are separated by blanks.
   void row(const std::string& item);
