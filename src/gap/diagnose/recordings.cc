@@ -377,12 +377,7 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const auto sides = split_at_step(trusted, checks);
   Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, progress, checks).run();
   if (!d) return d;
-  double corrected = 1;  // probability of the corrections, on which those of causes depend
-  for (const Check& check : checks)
-    if (!check.contradicted && check.probability > 0) corrected *= check.probability;
-  d->verdict_probability *= corrected;
-  d->outside.probability *= corrected;
-  for (DiagnosedEffect& e : d->effects) e.probability *= corrected, e.group *= corrected;
+  weigh_by_checks(*d);
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "gap/verdict/answer.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "robot/robot_file.h"
 #include "tests/gap/verdict/made_diagnosis.h"
@@ -159,6 +160,37 @@ TEST(Offer, ReadsEarlierVersions) {
   EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().message,
             "the verdict is inconclusive");
   EXPECT_EQ(offer_from_json(json::object()).error().fault, Fault::corrupt);
+}
+
+// An error of the wheels with a probability of 0.3 is left in the readings, one of the current with 0.9 is
+// corrected.
+TEST(Offer, WeighsCausesByChecks) {
+  Diagnosis d = made_diagnosis();
+  const double before = d.effects[0].probability, group = d.effects[0].group;
+  d.checks.push_back({"wheel_velocity_scale", "wheel_velocity", 2, {1.9, 2.1}, "It may be twice.", false});
+  d.checks.back().probability = 0.3;
+  d.checks.push_back({"battery_current_scale", "battery_current", 10, {9, 11}, "It is ten times.", false});
+  d.checks.back().probability = 0.9;
+  d.checks.back().factor = 10;
+  weigh_by_checks(d);
+  EXPECT_NEAR(d.effects[0].probability, 0.7 * 0.9 * before, 1e-12);
+  EXPECT_NEAR(d.effects[0].group, 0.7 * 0.9 * group, 1e-12);
+  EXPECT_EQ(d.verdict, Verdict::effects);
+  EXPECT_EQ(d.refusal, made_diagnosis().refusal);
+  // A channel that is not used does not matter.
+  d.checks.back().contradicted = true;
+  weigh_by_checks(d);
+  EXPECT_NEAR(d.effects[0].probability, 0.7 * 0.7 * 0.9 * before, 1e-12);
+}
+
+TEST(Offer, RefusesCausesOfLikelyError) {
+  Diagnosis d = made_diagnosis();
+  d.checks.push_back({"wheel_velocity_scale", "wheel_velocity", 2, {1.9, 2.1}, "It may be twice.", false});
+  d.checks.back().probability = 0.6;
+  weigh_by_checks(d);
+  EXPECT_EQ(d.verdict, Verdict::inconclusive);
+  EXPECT_THAT(d.reasons.front(), HasSubstr("60\u00a0%"));
+  EXPECT_THAT(offer_of(d).refusal, HasSubstr("60\u00a0%"));
 }
 
 }  // namespace
