@@ -202,8 +202,7 @@ void print_next_drives(const Json& drives) {
 void print_adoption(const Json& d) {
   const Json& adoption = member_at(d, "adoption");
   if (!member_at(adoption, "effects").empty() && adoption["refusal"].is_string())
-    fmt::print("not to be adopted: {}{}\n", wrapped(text(adoption["refusal"]), help_width(), 2),
-               adoption["choice_settles"] == true ? " with --effect" : "");
+    fmt::print("not to be adopted: {}\n", wrapped(text(adoption["refusal"]), help_width(), 2));
 }
 
 void print_effect(const Json& e) {

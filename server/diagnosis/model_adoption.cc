@@ -267,7 +267,7 @@ Result<DiagnosedModel> diagnosed_model(const history::Store& store, const histor
   TRY_ASSIGN(const robot::RobotModel robot, robot::parse_robot(version.model_json));
   Result<robot::RobotModel> model = gap::take(offer, robot, choice);
   if (!model) return tl::unexpected(as_of_request(std::move(model.error()), offer));
-  return DiagnosedModel{std::move(*model), offer.choice_settles ? "" : offer.refusal};
+  return DiagnosedModel{std::move(*model), offer.refusal};
 }
 
 }  // namespace joulecast::server

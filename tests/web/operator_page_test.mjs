@@ -1348,8 +1348,7 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
       ],
       corrections: [{ parameter: 'idle_power_w', file: 20, fits: 31, sd: 0.4 }],
       adoption: {
-        refusal: 'coulomb_friction is not distinguished from viscous_friction: name the one to adopt',
-        choice_settles: true,
+        refusal: null,
         corrects_file: true,
         effects: [
           {
@@ -1390,7 +1389,7 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
   await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
   await page.unroute(`**/v1/robots/worn-01/models`);
-  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
+  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive' });
   refused.result.adoption.effects[0].instead = [];
   await openAnew(page, diagnosis);
   await page.getByText('Not recommended:').waitFor();

@@ -30,14 +30,6 @@ Diagnosis undecided() {
   return d;
 }
 
-// The offer of an earlier version, which left the choice to its reader.
-Offer with_choice(const Diagnosis& d) {
-  Offer offer = offer_of(d);
-  offer.choice_settles = true;
-  offer.refusal = "coulomb_friction is not distinguished from viscous_friction and turning_scrub";
-  return offer;
-}
-
 // Effects of a robot file with their first parameters.
 std::vector<std::string> effects_of(const robot::RobotModel& model) {
   std::vector<std::string> texts;
@@ -94,28 +86,14 @@ TEST(Offer, RequiresForceAfterRefusal) {
 
 TEST(Offer, AcceptsEquivalentsWithoutChoice) {
   const Diagnosis d = undecided();
-  EXPECT_FALSE(offer_of(d).choice_settles);
   EXPECT_EQ(taken(d, {}), friction);
   EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
 }
 
-TEST(Offer, RequiresChoiceDespiteForce) {
-  const Offer d = with_choice(undecided());
-  for (const bool force : {false, true}) {
-    const Error error = refused(d, {{}, force});
-    EXPECT_EQ(error.fault, Fault::conflict);
-    EXPECT_THAT(error.message, HasSubstr("viscous_friction and turning_scrub"));
-  }
-  EXPECT_EQ(taken(d, {{"coulomb_friction"}, false}), friction);
-  EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
-}
-
 TEST(Offer, RejectsChoiceWithoutStrength) {
-  const Offer d = with_choice(undecided());
+  const Offer d = offer_of(undecided());
   EXPECT_THAT(refused(d, {{"turning_scrub"}, false}).message, HasSubstr("no strength of turning_scrub"));
   Error error = refused(d, {{"brush_drop"}, false});
-  EXPECT_EQ(error.fault, Fault::conflict);  // the group is still open
-  error = refused(d, {{"brush_drop", "coulomb_friction"}, false});
   EXPECT_EQ(error.fault, Fault::invalid);
   EXPECT_EQ(error.field, "effect");
   EXPECT_THAT(error.message, HasSubstr("brush_drop is not among"));
@@ -142,23 +120,10 @@ TEST(Offer, SurvivesJsonRoundTrip) {
   }
 }
 
-// The JSON of version 1.
-TEST(Offer, ReadsEarlierVersions) {
-  json old = {{"verdict", "effects"},
-              {"effects",
-               {{{"id", "coulomb_friction"},
-                 {"parameters", {{"ratio", {{"value", 0.41}, {"sd", 0.01}, {"unit", "1"}}}}},
-                 {"alternatives", json::array()}}}}};
-  const auto model = take(*offer_from_json(old), joulecast::testing::nomad());
-  ASSERT_TRUE(model) << describe(model.error());
-  EXPECT_EQ(effects_of(*model), friction);
-  old["effects"][0]["alternatives"] = {"viscous_friction"};
-  EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().fault, Fault::conflict);
-  EXPECT_TRUE(take(*offer_from_json(old), joulecast::testing::nomad(), {{"coulomb_friction"}, false}));
-  old["effects"][0]["alternatives"] = json::array();
-  old["verdict"] = "inconclusive";
-  EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().message,
-            "the verdict is inconclusive");
+TEST(Offer, RejectsDiagnosisWithoutOffer) {
+  json old = json::parse(diagnosis_to_json(made_diagnosis()).dump());
+  old.erase("adoption");
+  EXPECT_EQ(offer_from_json(old).error().fault, Fault::corrupt);
   EXPECT_EQ(offer_from_json(json::object()).error().fault, Fault::corrupt);
 }
 
