@@ -83,18 +83,14 @@ void state_held_out(const HeldOut& h, Diagnosis& d) {
 }
 
 void weigh_by_checks(Diagnosis& d) {
-  double sound = 1;
-  for (const Check& check : d.checks)
-    if (!check.contradicted && check.probability > 0)
-      sound *= check.factor || check.swapped ? check.probability : 1 - check.probability;
+  const double sound = sound_readings(d.checks);
   d.verdict_probability *= sound;
   d.outside.probability *= sound;
   for (DiagnosedEffect& e : d.effects) e.probability *= sound, e.group *= sound;
   if (sound >= posterior::named) return;
   d.verdict = Verdict::inconclusive;
   d.corrections.clear();
-  d.refusal = fmt::format("an error of the readings has a probability of {}", probability_text(1 - sound));
-  d.reasons.insert(d.reasons.begin(), sentence(d.refusal + ": see the checks"));
+  d.refusal = error_words(sound);
 }
 
 void state_offer(const posterior::Fit& fit, const Explained& answer, const MovedPower& moved_w,

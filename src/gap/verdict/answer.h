@@ -15,8 +15,7 @@ void state_effects(const posterior::Explained& answer, double mean_power_w, Diag
 // shrinkage. Does nothing where no power was held out.
 void state_held_out(const posterior::HeldOut& held_out, Diagnosis& diagnosis);
 
-// Multiplies probabilities by that of readings without an error: corrected as the diagnosis took them, or as
-// they are where the checks hold an error for likely. Below one half the verdict is inconclusive.
+// Multiplies probabilities by sound_readings(). Below one half the verdict is inconclusive.
 void weigh_by_checks(Diagnosis& diagnosis);
 
 // Mean |change of power| by one effect [W]; 0 without power.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "gap/posterior/constants.h"
 #include "gap/verdict/words.h"
 #include "windows/track.h"
 
@@ -64,6 +65,8 @@ class Reasons {
       return said_;
     }
     if (d_.verdict == Verdict::none) return said_;
+    if (const double sound = sound_readings(d_.checks); sound < posterior::named)
+      say("{}: see the checks", error_words(sound));
     if (d_.verdict == Verdict::not_this_robot)
       say("the robot file has an error of {} of the power: it belongs to another robot, or to another "
           "state of this one{}",
@@ -154,6 +157,18 @@ class Reasons {
 };
 
 }  // namespace
+
+double sound_readings(std::span<const Check> checks) {
+  double sound = 1;
+  for (const Check& check : checks)
+    if (!check.contradicted && check.probability > 0)
+      sound *= check.factor || check.swapped ? check.probability : 1 - check.probability;
+  return sound;
+}
+
+std::string error_words(double sound) {
+  return fmt::format("an error of the readings has a probability of {}", probability_text(1 - sound));
+}
 
 std::string outside_words(const Outside& o) {
   const std::string probability = probability_text(o.probability);

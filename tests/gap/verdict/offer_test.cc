@@ -8,6 +8,7 @@
 
 #include "gap/verdict/answer.h"
 #include "gap/verdict/diagnosis_json.h"
+#include "gap/verdict/text.h"
 #include "robot/robot_file.h"
 #include "tests/gap/verdict/made_diagnosis.h"
 #include "tests/support/sample_robots.h"
@@ -154,7 +155,7 @@ TEST(Offer, RefusesCausesOfLikelyError) {
   d.checks.back().probability = 0.6;
   weigh_by_checks(d);
   EXPECT_EQ(d.verdict, Verdict::inconclusive);
-  EXPECT_THAT(d.reasons.front(), HasSubstr("60\u00a0%"));
+  EXPECT_THAT(reasons_for(d, false).front(), HasSubstr("60\u00a0%"));
   EXPECT_THAT(offer_of(d).refusal, HasSubstr("60\u00a0%"));
 }
 
