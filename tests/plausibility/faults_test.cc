@@ -136,8 +136,8 @@ TEST_F(Faults, AddsNearlyEqualFactors) {
   EXPECT_NEAR(found.probability[0], (1 + feet) / (1 + feet + none), 1e-9);
 }
 
-// Wheels at half their speed, with a radius of 0.4 m: neither "half" nor "in m/s at the rim" is certain, but one
-// of them is.
+// Wheels at half their speed, with a radius of 0.4 m: neither "half" nor "in m/s at the rim" is certain, but
+// one of them is.
 TEST_F(Faults, AddsFactorsOfOneChannel) {
   robot_.kinematics.wheel_radius_m = 0.4;
   const std::vector<ChannelEvidence> some{heavy_evidence(2, {{reading::wheel_velocity, -1}}, 0.1),
