@@ -89,6 +89,7 @@ Error with_flags(Error error, const AskOptions& options) {
   if (options.turn_rad) rename("/path/0/angle_rad", "--turn");
   if (options.length_m) rename(options.turn_rad ? "/path/1/length_m" : "/path/0/length_m", "--length");
   for (const Given& each : options.given) rename("/" + each.member, each.flag);
+  rename("/state_of_charge", "--charge");  // unknown to a daemon
   return error;
 }
 

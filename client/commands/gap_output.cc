@@ -110,9 +110,9 @@ void print_gap(const Json& d) {
   } else if (member_at(d, "gap/energy_relative").is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
-    fmt::print("gap: {:+.1f} % of the measured energy; mean absolute power error {:.1f} %{}{}\n",
-               percent_at(d, "gap/energy_relative"), percent_at(d, "gap/power_absolute_relative"),
-               in_brackets("noise floor ", d["gap"]),
+    fmt::print("gap: {} of the measured energy; mean absolute power error {:.1f} %{}{}\n",
+               without_sign_of_zero(fmt::format("{:+.1f} %", percent_at(d, "gap/energy_relative"))),
+               percent_at(d, "gap/power_absolute_relative"), in_brackets("noise floor ", d["gap"]),
                of_motors ? ", of the motors' power with the file's idle power" : "");
   }
   std::string others;

@@ -74,7 +74,7 @@ Result<std::vector<vr::EffectStrength>> parse_effects(const std::vector<std::str
     const char* end = text.data() + text.size();
     if (equals == std::string::npos || std::from_chars(text.data() + equals + 1, end, strength) !=
                                            std::from_chars_result{end, std::errc{}}) {
-      return invalid("--effect", text + " is not id=strength; --list-effects names the ids and their units");
+      return invalid("--effect", "must be id=strength, is " + text + "; --list-effects lists ids and units");
     }
     result.emplace_back(text.substr(0, equals), strength);
   }

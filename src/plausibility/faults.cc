@@ -194,11 +194,11 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
        {"computed from m/s as if they were km/h", 1 / km_h, odd_nats},
        {"computed from miles an hour as if they were m/s", mph, odd_nats},
        {"computed from feet a second as if they were m/s", feet, odd_nats},
-       {"2 times the motion, counted twice", 2, unit_nats},
-       {"4 times the motion, counted four times", 4, odd_nats},
-       {"0.5 times the motion, counted half", 0.5, odd_nats},
-       {"0.25 times the motion, counted a quarter", 0.25, odd_nats},
-       {"6.28 times the motion, multiplied by 2 pi", 2 * std::numbers::pi, odd_nats}});
+       {"counted twice (2 times the motion)", 2, unit_nats},
+       {"counted four times (4 times the motion)", 4, odd_nats},
+       {"counted half (0.5 times the motion)", 0.5, odd_nats},
+       {"counted a quarter (0.25 times the motion)", 0.25, odd_nats},
+       {"multiplied by 2 pi once too often", 2 * std::numbers::pi, odd_nats}});
   for (std::size_t k : {0u, 1u})
     add("wheel_velocity", std::string("wheel_velocity.") + side_name[k], {wheel_velocity + k},
         {{reversed, -1, sign_nats}});
