@@ -9,6 +9,7 @@
 #include "base/try.h"
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
+#include "gap/verdict/words.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap::posterior {
@@ -125,7 +126,8 @@ class Explainer {
     a_.reasons.push_back(fmt::format(
         "a dependence on {} is not the verdict: it reduces the error on held-out data by less than {:.0f} % "
         "of the power ({:.1f} % with it, {:.1f} % without)",
-        fit_.functions[*summary_.function].variable, 100 * clear_gain, 100 * a_.held_out.function_all,
+        words_of(fit_.functions[*summary_.function].variable), 100 * clear_gain,
+        100 * a_.held_out.function_all,
         100 * std::min(a_.held_out.function_effects, a_.held_out.function_file)));
   }
 
