@@ -619,7 +619,7 @@ TEST(ImportLayout, DamagedRowsAreLeftOut) {
                                   std::string("2,1,1,2e"), zeros, "2,1" + zeros, zeros + "\n"})
     EXPECT_EQ(rows_and_note(tail), left_out) << tail;
   EXPECT_THAT(rows_and_note("2,1" + zeros + "1,1\n3,1,1,25\n"), HasSubstr("3: damaged rows"));
-  EXPECT_EQ(rows_and_note("t,r,l,v\n2,1,1,25\n"), "3: the header comes 1 times more");
+  EXPECT_EQ(rows_and_note("t,r,l,v\n2,1,1,25\n"), "3: repeated headers: 1");
   EXPECT_EQ(rows_and_note("2,1,1,25,,\n"), "3");
   EXPECT_THAT(rows_and_note("2,1\n3,1,1,25\n"),
               HasSubstr("x.csv: line 4: has 2 fields, the header 4. If its columns"));
@@ -694,8 +694,8 @@ TEST(ImportLayout, LinesBeforeHeaderAreLeftOut) {
 
 TEST(ImportLayout, ShortHeadersAreExplained) {
   for (const auto& [csv, line, advice] :
-       {std::tuple{"t,r,l,v\n0,1,1,25,0.5\n1,1,1,25,0.5\n", "line 2", R"("header" names every column)"},
-        {"t;r;l;v\n0;1;1;25;0.5\n1;1;1;25;0.5\n", "line 2", R"("header" names every column)"},
+       {std::tuple{"t,r,l,v\n0,1,1,25,0.5\n1,1,1,25,0.5\n", "line 2", R"(Name every column in "header")"},
+        {"t;r;l;v\n0;1;1;25;0.5\n1;1;1;25;0.5\n", "line 2", R"(Name every column in "header")"},
         {"t,r,l,v\n0,1,1,25\n1,1,1,25,0.5\n2,1,1,25,0.5\n", "line 3", "split the table here"}}) {
     const auto read = read_table(csv, in_seconds);
     ASSERT_FALSE(read);
