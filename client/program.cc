@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <memory>
 #include <new>
-#include <string>
 #include <utility>
 #include <vector>
 

@@ -19,7 +19,7 @@ cmp -s "$lock" "$tools/.installed.json" || {
 }
 mapfile -t scripts < <(git ls-files -- 'server/web/*.mjs' 'server/web/source/*.js' 'server/web/source/*.jsx' 'tests/web/*.mjs' \
   'deploy/import/bags/*.mjs' 'tests/import/*.mjs')
-"$tools/.bin/biome" lint --config-path server/web/biome-lint.json --error-on-warnings "${scripts[@]}"
+"$tools"/@biomejs/cli-linux-*/biome lint --config-path server/web/biome-lint.json --error-on-warnings "${scripts[@]}"
 "$tools/.bin/prettier" --config server/web/.prettierrc.json --log-level warn --check "${scripts[@]}" 'server/web/source/**/*.css'
 if grep -nE '^ *// .{108}' "${scripts[@]}"; then exit 1; fi # comments longer than prettier's lines
 if [ $# -gt 0 ]; then

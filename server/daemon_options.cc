@@ -8,7 +8,6 @@
 #include "access/secret_file.h"
 #include "base/host_clock.h"
 #include "base/try.h"
-#include "history/open_store.h"
 #include "ingest/model_loading.h"
 #include "ingest/signature_gate.h"
 #include "server/http/cors.h"

@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <map>
 #include <mutex>
-#include <utility>
 
 namespace joulecast {
 namespace {
@@ -43,10 +42,6 @@ void Counter::raise_to(double total) const {
 
 void Gauge::set(double value) const {
   if (gauge_ != nullptr) gauge_->Set(value);
-}
-
-void Gauge::add(double amount) const {
-  if (gauge_ != nullptr) gauge_->Increment(amount);
 }
 
 void Histogram::observe(double value) const {

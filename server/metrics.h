@@ -36,7 +36,6 @@ class Gauge {
  public:
   Gauge() = default;
   void set(double value) const;
-  void add(double amount) const;
 
  private:
   friend class Metrics;

@@ -89,6 +89,7 @@ Error with_flags(Error error, const AskOptions& options) {
   if (options.turn_rad) rename("/path/0/angle_rad", "--turn");
   if (options.length_m) rename(options.turn_rad ? "/path/1/length_m" : "/path/0/length_m", "--length");
   for (const Given& each : options.given) rename("/" + each.member, each.flag);
+  rename("/state_of_charge", "--charge");  // unknown to a daemon
   return error;
 }
 
@@ -118,8 +119,7 @@ Result<void> plot(const AskOptions& options, const Question& question, Json requ
   const bool given = request.contains("profile");
   if (!given) request["baseline_columns"] = true;
   TRY_ASSIGN(const auto text, answer(options, given ? question : profile, request));
-  const Json document = Json::parse(text, nullptr, false);
-  if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
+  TRY_ASSIGN(const auto document, object_of(text, options.server));
   TRY_ASSIGN(const auto drawing, draw_answer(document));
   return write_text_file(options.plot_file, drawing, existing(options.force));
 }
@@ -159,14 +159,14 @@ Result<Exit> run_ask(const AskOptions& options, const Question& question) {
     return with_flags(std::move(error), options);
   }));
   if (!options.plot_file.empty()) TRY(plot(options, question, request));
-  const Json document = Json::parse(text, nullptr, false);
-  if (document.is_object()) warn_of_limits(document);
+  const auto document = object_of(text, options.server);
+  if (document) warn_of_limits(*document);
   if (options.json) {
     std::puts(text.c_str());
     return Exit::ok;
   }
-  if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
-  question.print(document, options.unit);
+  if (!document) return tl::unexpected(document.error());
+  question.print(*document, options.unit);
   return Exit::ok;
 }
 

@@ -86,11 +86,12 @@ void print_prediction(const Json& document) {
     return number_of(summary, name, decimals, scale);
   };
   fmt::print(
-      "{} discharges; time error: median {} %, 95th percentile {} %; voltage rms above {:.0f} % of the "
-      "charge delivered: {} mV, worst {} mV; of the capacity: {} mV\n",
-      text_of(summary["count"]), figure("time_error_median", 2, 1e2), figure("time_error_p95", 2, 1e2),
-      1e2 * battery::least_charge, figure("voltage_rms_v", 1, 1e3), figure("voltage_rms_worst_v", 1, 1e3),
-      figure("voltage_rms_by_capacity_v", 1, 1e3));
+      "{0}; time error: median {1} %, 95th percentile {2} %\n"
+      "voltage error until {3:.0f} % of the delivered charge is left: rms {4} mV, worst discharge {5} mV; "
+      "until {3:.0f} % of the capacity is left: rms {6} mV\n",
+      count_of(summary["count"], "discharge"), figure("time_error_median", 2, 1e2),
+      figure("time_error_p95", 2, 1e2), 1e2 * battery::least_charge, figure("voltage_rms_v", 1, 1e3),
+      figure("voltage_rms_worst_v", 1, 1e3), figure("voltage_rms_by_capacity_v", 1, 1e3));
   for (const Json& each : document["failed"])
     fmt::print("not predicted: {}: {}\n", text_of(each["name"]), text_of(each["reason"]));
 }

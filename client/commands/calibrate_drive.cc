@@ -97,7 +97,7 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   // Telemetry between missions is used only if the robot declares no missions.
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
-  if (all.empty()) return invalid("log", "no telemetry of robot " + robot_id + " in the logs");
+  if (all.empty()) return invalid("log", "contains no telemetry of " + robot_id);
   for (telemetry::Recording& r : all) {
     if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
   }
@@ -105,7 +105,7 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
     fmt::print(stderr, "joulecast: {} samples count as not measured: {}\n", dropped.samples, dropped.why);
   for (const std::string& wanted : options.train) {
     if (wanted != "all" && std::ranges::none_of(all, [&](const auto& r) { return r.mission_id == wanted; }))
-      return invalid("--train", "no mission " + wanted + " of robot " + robot_id + " in the logs");
+      return invalid("--train", "the logs contain no mission " + wanted + " of " + robot_id);
   }
   return std::move(all);
 }
@@ -292,7 +292,7 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
       text_column("used", [](const Json& row) { return row["trained_on"] == true ? "to fit" : "to test"; });
   const auto error = [](const char* member) {
     return text_column("error", [member](const Json& row) {
-      return fmt::format("{:+.1f} %", 1e2 * number_or_nan(row[member]));
+      return without_sign_of_zero(fmt::format("{:+.1f} %", 1e2 * number_or_nan(row[member])));
     });
   };
   print_rows(drive_json(outcome)["missions"], {{"mission", "mission_id"},
@@ -343,8 +343,8 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
        {"--out", &O::out, "robot file to write", file_of("json")},
        {"--force", &O::force, force_help},
        {"--train", &O::train,
-        "missions to fit to, comma-separated, or all; the others test (default: two of three)", named("ID"),
-        commas},
+        "missions to fit, comma-separated, or all; the others are the test (default: two of three)",
+        named("ID"), commas},
        {"--method", &O::method,
         "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power alone, "
         "with a list of the parameters that it cannot identify (default: steady, or power if no motor "
@@ -355,7 +355,7 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
        {"--steady-acceleration", &O::steady_fraction_1_s,
         "greatest acceleration at constant speed, as a fraction of the top speed per second", positive()},
        {"--contradicted", &O::contradicted,
-        "identify also from channels that joulecast check finds contradicted, for instance because of a "
+        "use also channels that joulecast check reports as contradicted, for instance because of a "
         "mismatched robot file"},
        unit_row<O>(),
        {"--json", &O::json, "print the result as JSON"}},

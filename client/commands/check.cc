@@ -281,7 +281,7 @@ void print_check(const Report& report) {
                           reach(figures["top_speed_m_s"].get<double>()), figures["energy_wh"].get<double>(),
                           figures["standing_h"].is_null()
                               ? ""
-                              : fmt::format(", {:.3g} h at rest", figures["standing_h"].get<double>()));
+                              : fmt::format(", {:.1f} h at rest", figures["standing_h"].get<double>()));
     fmt::print("{}\n", text);
   }
   for (const auto& [channel, tally] : report.watch.channels())

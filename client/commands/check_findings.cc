@@ -61,8 +61,9 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
   if (std::string slow = telemetry::slow_stream(sampled_hz); !slow.empty())
     add(false, "", std::move(slow), sampled_hz);
   const telemetry::SequenceCounters& s = tally.sequence;
-  const auto counted = [&](std::uint64_t count, bool fault, const char* field, const char* says) {
-    if (count > 0) add(fault, field, fmt::format("{} {}", count, says), static_cast<double>(count));
+  const auto counted = [&](std::uint64_t count, bool fault, const char* field, const char* thing,
+                           const char* says) {
+    if (count > 0) add(fault, field, count_of(count, thing) + says, static_cast<double>(count));
   };
   // A publisher that never counts looks like one that boots at every message.
   if (s.restarts > 1 && 2 * s.restarts > s.received)
@@ -72,13 +73,13 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
             s.restarts, tally.messages),
         static_cast<double>(s.restarts));
   else
-    counted(s.restarts, false, "sequence", "restarts: the robot booted, or two programs publish");
-  counted(s.missing - std::min(s.missing, s.late), false, "sequence",
-          "messages are missing, according to their sequence numbers");
-  counted(s.duplicate, false, "sequence", "messages are duplicates");
-  counted(tally.gaps, false, "utime", "gaps are too long to interpolate; their energy is not counted");
-  counted(s.clock_backward, true, "utime", "times the robot's clock stood still or was set back");
-  counted(s.clock_forward, false, "utime", "times the robot's clock jumped forward");
+    counted(s.restarts, false, "sequence", "restart", ": the robot booted, or two programs publish");
+  counted(s.missing - std::min(s.missing, s.late), false, "sequence", "message",
+          " missing, according to the sequence numbers");
+  counted(s.duplicate, false, "sequence", "message", " received more than once");
+  counted(tally.gaps, false, "utime", "gap", " too long to interpolate: no energy is counted there");
+  counted(s.clock_backward, true, "utime", "time", " the robot's clock stood still or was set back");
+  counted(s.clock_forward, false, "utime", "time", " the robot's clock jumped forward");
   const double silence_s = 1e-6 * static_cast<double>(tally.longest_silence_us);
   if (live && rate_hz > 0 && silence_s > signals::longest_bridged_s(1 / rate_hz))
     add(false, "", fmt::format("no message for {:.3g} s", silence_s), silence_s);
@@ -205,12 +206,8 @@ void print(const Findings& findings) {
                                help_width(), 8));
   }
   if (findings.empty()) return fmt::print("no problems found\n");
-  const auto told = [](std::ptrdiff_t count, const char* what) {
-    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
-  };
-  const auto faults = std::ranges::count_if(findings, &Finding::fault);
-  const auto warnings = static_cast<std::ptrdiff_t>(findings.size()) - faults;
-  fmt::print("{}, {}\n", told(faults, "fault"), told(warnings, "warning"));
+  const auto faults = static_cast<std::size_t>(std::ranges::count_if(findings, &Finding::fault));
+  fmt::print("{}, {}\n", count_of(faults, "fault"), count_of(findings.size() - faults, "warning"));
 }
 
 Exit exit_of(const Findings& findings) {

@@ -123,7 +123,8 @@ Result<RmfFit> fit_of(const RmfOptions& options, const std::optional<RmfParamete
 }
 
 std::string error_text(const RmfError& error) {
-  return fmt::format("{:.1f} % (mean {:+.1f} %)", 100 * error.absolute, 100 * error.bias);
+  return fmt::format("{:.1f} % (mean {})", 100 * error.absolute,
+                     without_sign_of_zero(fmt::format("{:+.1f} %", 100 * error.bias)));
 }
 
 std::string summary_of(const RmfOptions& options, const RmfFit& fit) {

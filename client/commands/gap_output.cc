@@ -11,7 +11,6 @@
 #include "base/host_clock.h"
 #include "base/json_number.h"
 #include "base/utc_time.h"
-#include "client/commands/print.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"
@@ -110,9 +109,9 @@ void print_gap(const Json& d) {
   } else if (member_at(d, "gap/energy_relative").is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
-    fmt::print("gap: {:+.1f} % of the measured energy; mean absolute power error {:.1f} %{}{}\n",
-               percent_at(d, "gap/energy_relative"), percent_at(d, "gap/power_absolute_relative"),
-               in_brackets("noise floor ", d["gap"]),
+    fmt::print("gap: {} of the measured energy; mean absolute power error {:.1f} %{}{}\n",
+               without_sign_of_zero(fmt::format("{:+.1f} %", percent_at(d, "gap/energy_relative"))),
+               percent_at(d, "gap/power_absolute_relative"), in_brackets("noise floor ", d["gap"]),
                of_motors ? ", of the motors' power with the file's idle power" : "");
   }
   std::string others;
@@ -202,8 +201,7 @@ void print_next_drives(const Json& drives) {
 void print_adoption(const Json& d) {
   const Json& adoption = member_at(d, "adoption");
   if (!member_at(adoption, "effects").empty() && adoption["refusal"].is_string())
-    fmt::print("not to be adopted: {}{}\n", wrapped(text(adoption["refusal"]), help_width(), 2),
-               adoption["choice_settles"] == true ? " with --effect" : "");
+    fmt::print("not to be adopted: {}\n", wrapped(text(adoption["refusal"]), help_width(), 2));
 }
 
 void print_effect(const Json& e) {

@@ -47,8 +47,9 @@ Result<Json> follow(const std::string& server, Json job) {
 }
 
 void print_result(const Json& job) {
-  fmt::print("diagnosis {} against model version {}, {} held back\n", job["id"].get<std::int64_t>(),
-             job["model_version"].get<std::int64_t>(), count_of(job["held_back"].size(), "mission"));
+  fmt::print("diagnosis {} against model version {}, {} held back for the back-test\n",
+             job["id"].get<std::int64_t>(), job["model_version"].get<std::int64_t>(),
+             count_of(job["held_back"].size(), "mission"));
   print_diagnosis(job["result"]);
 }
 

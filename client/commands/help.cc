@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <vector>
 
@@ -69,8 +68,10 @@ std::string HelpFormatter::row(const std::string& left, const std::string& text)
 
 std::string HelpFormatter::make_usage(const CLI::App* app, std::string) const {
   const std::string path = command_path(*app);
-  return '\n' +
-         CLI::Formatter::make_usage(app, program_of(*app).get_name() + (path.empty() ? "" : " " + path));
+  std::string usage =
+      CLI::Formatter::make_usage(app, program_of(*app).get_name() + (path.empty() ? "" : " " + path));
+  if (names_of_commands(*app).empty()) usage = usage.substr(0, usage.find(" [" + get_label("SUBCOMMAND")));
+  return '\n' + usage + (usage.ends_with('\n') ? "" : "\n");
 }
 
 std::string HelpFormatter::make_description(const CLI::App* app) const {

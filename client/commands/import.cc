@@ -8,11 +8,9 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -167,7 +165,7 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
     for (telemetry::Import& import : *missions) {
       all.push_back({std::move(import), source.shown});
       if (all.back().begin_utime_us() < telemetry::year_2000_utime_us)
-        return invalid("--start", source.shown + " contains no recording time: give its start");
+        return invalid("--start", source.shown + " contains no dates: give the time of its first row");
     }
     if (how.start_utime_us) how.start_utime_us = all.back().end_utime_us() + how.pause_us;
   }

@@ -7,7 +7,6 @@
 #include "base/try.h"
 #include "client/interrupt.h"
 #include "telemetry/codec.h"
-#include "telemetry/lcm_link.h"
 #include "telemetry/log_recordings.h"
 
 namespace joulecast::client {

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 
+#include "base/text.h"
 #include "base/utc_time.h"
 
 namespace joulecast::client {
@@ -128,11 +128,7 @@ void add_example(CLI::App& command, const char* request) {
 }
 
 Result<std::int64_t> parse_time(const std::string& text, const std::string& option) {
-  const char* end = text.data() + text.size();
-  std::int64_t utime_us = 0;
-  if (const auto [stop, fault] = std::from_chars(text.data(), end, utime_us);
-      fault == std::errc() && stop == end && utime_us >= 0)
-    return utime_us;
+  if (const auto utime_us = to_number<std::int64_t>(text); utime_us && *utime_us >= 0) return *utime_us;
   if (const auto parsed = parse_utc(text)) return *parsed;
   const bool dated = text.size() >= date_length && text[4] == '-' && text[7] == '-';
   if (dated && !parse_utc(text.substr(0, date_length)))

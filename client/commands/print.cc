@@ -65,8 +65,13 @@ std::string text_of(const Json& value) {
   return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
 }
 
+std::string without_sign_of_zero(std::string number) {
+  if (number.find_first_of("123456789") == std::string::npos) number.erase(0, number.find_first_not_of("+-"));
+  return number;
+}
+
 std::string number_text(double value, int decimals) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
+  return std::isfinite(value) ? without_sign_of_zero(fmt::format("{:.{}f}", value, decimals)) : "-";
 }
 
 std::string number_of(const Json& object, std::string_view path, int decimals, double scale) {

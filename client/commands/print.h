@@ -35,6 +35,8 @@ void print_json(const Json& document);
 [[nodiscard]] const Json& member_at(const Json& object, std::string_view path);
 // "-" for null.
 [[nodiscard]] std::string text_of(const Json& value);
+// "-0.0 %" -> "0.0 %".
+[[nodiscard]] std::string without_sign_of_zero(std::string number);
 // "-" for a value that is not finite.
 [[nodiscard]] std::string number_text(double value, int decimals);
 // The number at `path`, times `scale`; "-" if it is missing.

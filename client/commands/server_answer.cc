@@ -7,8 +7,6 @@
 #include <cctype>
 #include <cstdio>
 #include <cstdlib>
-#include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/json_text.h"
 #include "base/try.h"

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +16,7 @@
 
 #include "access/robot_keys.h"
 #include "base/host_clock.h"
+#include "base/text.h"
 #include "base/text_file.h"
 #include "base/try.h"
 #include "base/utc_time.h"
@@ -70,13 +70,10 @@ Result<std::vector<vr::EffectStrength>> parse_effects(const std::vector<std::str
   std::vector<vr::EffectStrength> result;
   for (const auto& text : texts) {
     const std::size_t equals = text.find('=');
-    double strength = 0;
-    const char* end = text.data() + text.size();
-    if (equals == std::string::npos || std::from_chars(text.data() + equals + 1, end, strength) !=
-                                           std::from_chars_result{end, std::errc{}}) {
-      return invalid("--effect", text + " is not id=strength; --list-effects names the ids and their units");
-    }
-    result.emplace_back(text.substr(0, equals), strength);
+    const auto strength = to_number<double>(equals == std::string::npos ? "" : text.substr(equals + 1));
+    if (!strength)
+      return invalid("--effect", "must be id=strength, is " + text + "; --list-effects lists ids and units");
+    result.emplace_back(text.substr(0, equals), *strength);
   }
   return result;
 }

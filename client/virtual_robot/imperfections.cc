@@ -75,12 +75,13 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
   for (const auto& [id, strength] : effects) {
     const auto* entry = std::find_if(table.begin(), table.end(), [&](const auto& e) { return e.id == id; });
     if (entry == table.end()) {
-      return invalid("--effect", "no effect is called " + id + "; --list-effects names them" +
+      return invalid("--effect", id + " is not an effect; --list-effects lists them" +
                                      did_you_mean(id, table, &EffectEntry::id));
     }
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
       std::ostringstream text;
-      text << "the strength of " << id << " must be within +-" << entry->search_limit;
+      text << "the strength of " << id << " must be -" << entry->search_limit << " to "
+           << entry->search_limit;
       if (entry->unit != "1") text << ' ' << entry->unit;
       return invalid("--effect", text.str());
     }

@@ -1,7 +1,6 @@
 #include "client/virtual_robot/plant.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 namespace joulecast::virtual_robot {

@@ -4,9 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "base/text_file.h"
-#include "base/try.h"
-
 namespace joulecast::virtual_robot {
 namespace {
 
@@ -124,13 +121,6 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   }
   if (!in.fault().message.empty()) return tl::unexpected(in.fault());
   return p;
-}
-
-Result<RobotParameters> read_robot_file(const std::string& path) {
-  TRY_ASSIGN(const std::string text, read_text_file(path));
-  auto robot = parse_robot(text);
-  if (!robot) return fail(robot.error().fault, path + "#" + robot.error().field, robot.error().message);
-  return robot;
 }
 
 }  // namespace joulecast::virtual_robot

@@ -43,6 +43,5 @@ struct RobotParameters {
 // From the text of a robot file. Fault::invalid names the JSON pointer at fault. A robot file with adopted
 // effects is rejected: the plant's imperfections are given separately, never through the model.
 [[nodiscard]] Result<RobotParameters> parse_robot(const std::string& json_text);
-[[nodiscard]] Result<RobotParameters> read_robot_file(const std::string& path);
 
 }  // namespace joulecast::virtual_robot

@@ -1,7 +1,6 @@
 #include "server/api/common_parameters.h"
 
 #include <iterator>
-#include <utility>
 
 #include "base/text.h"
 #include "base/try.h"

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/json_writer.h"
 #include "history/store.h"
+#include "server/api/csv.h"
 #include "server/http/router.h"
 
 // Parameters that several endpoints share.
@@ -39,8 +40,17 @@ std::string next_id_cursor(const Items& items, std::int64_t limit, Id id_of) {
   return std::cmp_less(items.size(), limit) ? "" : std::to_string(std::invoke(id_of, items.back()));
 }
 
-// A page of a list: the members that `head` writes, the items by `write`, a table or a function, and
-// "next_cursor", null where `cursor` is empty.
+// Writes an item by a table or a function.
+template <class Item, class Write>
+void write_item(JsonWriter& json, const Item& item, const Write& write) {
+  if constexpr (std::is_invocable_v<Write, JsonWriter&, const Item&>)
+    write(json, item);
+  else
+    write.write(json, item);
+}
+
+// A page of a list: the members that `head` writes, the items by `write`, and "next_cursor", null where
+// `cursor` is empty.
 template <class Items, class Write>
 http::Response page_response(
     std::string_view name, const Items& items, const Write& write, std::string_view cursor,
@@ -48,15 +58,24 @@ http::Response page_response(
   JsonWriter json;
   head(json.begin_object());
   json.key(name).begin_array();
-  for (const auto& item : items) {
-    if constexpr (std::is_invocable_v<Write, JsonWriter&, decltype(item)>)
-      write(json, item);
-    else
-      write.write(json, item);
-  }
+  for (const auto& item : items) write_item(json, item, write);
   json.end_array().key("next_cursor");
   cursor.empty() ? json.null() : json.value(cursor);
   return http::json_response(json.end_object().take());
+}
+
+// The same items as CSV.
+template <class Items, class Write>
+http::Response csv_response(const http::Request& request, const std::string& name,
+                            std::vector<std::string> columns, const Items& items, const Write& write,
+                            std::string_view cursor = {}) {
+  Csv csv(request, std::move(columns));
+  for (const auto& item : items) {
+    JsonWriter json;
+    write_item(json, item, write);
+    csv.row(json.text());
+  }
+  return csv.response(name, request, cursor);
 }
 
 // The page of ids that ?cursor= and ?limit= select, and the next cursor; empty: it is the last.

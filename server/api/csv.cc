@@ -1,7 +1,10 @@
 #include "server/api/csv.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <initializer_list>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/resolution.h"
@@ -45,9 +48,13 @@ bool may_be_formula(std::string_view text) {
 
 }  // namespace
 
-Csv::Csv(const http::Request& request, const std::vector<std::string>& titles)
-    : digits_(static_cast<int>(request.query_integer("digits").value_or(http::usual_digits))) {
-  for (const std::string& title : titles) field(title);
+Csv::Csv(const http::Request& request, std::vector<std::string> columns)
+    : columns_(std::move(columns)),
+      digits_(static_cast<int>(request.query_integer("digits").value_or(http::usual_digits))) {
+  for (const std::string& column : columns_) {
+    const std::string title = column.substr(0, column.find_first_of("=?"));
+    field(title.substr(title.rfind('/') + 1));
+  }
   end_row();
 }
 
@@ -91,6 +98,29 @@ Csv& Csv::field(bool truth) {
 void Csv::end_row() {
   text_ += "\r\n";
   comma_ = false;
+}
+
+void Csv::row(const std::string& item) {
+  const auto members = nlohmann::json::parse(item);
+  for (const std::string& column : columns_) {
+    const bool asked = column.ends_with('?');
+    const std::string path =
+        column.substr(column.find('=') + 1).substr(0, asked ? column.size() - 1 : column.npos);
+    const auto value = members.value(nlohmann::json::json_pointer("/" + path), nlohmann::json());
+    if (asked)
+      field(!value.is_null());
+    else if (value.is_boolean())
+      field(value.get<bool>());
+    else if (value.is_number_integer())
+      field(value.get<std::int64_t>());
+    else if (value.is_number())
+      field(value.get<double>());
+    else if (value.is_array())
+      field(fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), " ")));
+    else
+      field(value.is_null() ? "" : value.get<std::string>());
+  }
+  end_row();
 }
 
 http::Response Csv::response(const std::string& name) {

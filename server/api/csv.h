@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,8 +13,9 @@ namespace joulecast::api {
 // spreadsheet would interpret as a formula is preceded by an apostrophe.
 class Csv {
  public:
-  // Numbers have the precision of the request's ?digits=.
-  Csv(const http::Request& request, const std::vector<std::string>& titles);
+  // Numbers have the precision of the request's ?digits=. A column is a member of the items, titled by its
+  // name: "state", "energy/battery_j", with another title "x_m=pose/0". "annulled?": whether there is one.
+  Csv(const http::Request& request, std::vector<std::string> columns);
 
   Csv& field(std::string_view text);
   Csv& field(const std::string& text) { return field(std::string_view(text)); }
@@ -24,8 +24,9 @@ class Csv {
   Csv& exact(double number);  // all digits, for raw data
   Csv& field(std::int64_t number);
   Csv& field(bool truth);
-  Csv& field(std::optional<std::int64_t> number) { return number ? field(*number) : field(""); }
   void end_row();
+  // A row of an item's JSON. Null is an empty field, texts of an array are separated by blanks.
+  void row(const std::string& item);
 
   // `name` is the file's name without its extension.
   http::Response response(const std::string& name);
@@ -36,6 +37,7 @@ class Csv {
  private:
   void separate();
 
+  const std::vector<std::string> columns_;
   int digits_;
   std::string text_;
   bool comma_ = false;

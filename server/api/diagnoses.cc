@@ -8,7 +8,6 @@
 #include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
-#include "server/api/csv.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosis_service.h"
@@ -140,21 +139,6 @@ Result<Response> cancel(Services& services, const Request& request) {
       }));
 }
 
-Response list_diagnoses_csv(const Services& services, const Request& request,
-                            const std::vector<history::DiagnosisRecord>& diagnoses,
-                            std::string_view next_cursor) {
-  Csv csv(request, {"id", "robot_id", "state", "cause", "created", "created_utime_us", "started_utime_us",
-                    "finished_utime_us", "model_version", "error"});
-  for (const history::DiagnosisRecord& d : diagnoses) {
-    const auto progress = services.diagnoses.progress(d.id);
-    csv.field(d.id).field(d.robot_id).field(history::name(progress ? progress->state : d.state));
-    csv.field(history::name(d.cause)).field(utc_text(d.created_utime_us)).field(d.created_utime_us);
-    csv.field(progress ? progress->started_utime_us : d.started_utime_us).field(d.finished_utime_us);
-    csv.field(d.model_version).field(d.error).end_row();
-  }
-  return csv.response("diagnoses", request, next_cursor);
-}
-
 Result<Response> list_diagnoses(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
@@ -163,10 +147,14 @@ Result<Response> list_diagnoses(const Services& services, const Request& request
   TRY_ASSIGN(const auto found,
              services.store.diagnoses(robot, cursor.value_or(history::whole_future), limit));
   const std::string next = next_id_cursor(found, limit, &DiagnosisRecord::id);
-  if (request.csv) return list_diagnoses_csv(services, request, found, next);
   const auto write = [&](JsonWriter& out, const DiagnosisRecord& d) {
     listed_diagnosis_table().write(out, {d, services.diagnoses.progress(d.id)});
   };
+  if (request.csv)
+    return csv_response(request, "diagnoses",
+                        {"id", "robot_id", "state", "cause", "created", "created_utime_us",
+                         "started_utime_us", "finished_utime_us", "model_version", "error"},
+                        found, write, next);
   return page_response("diagnoses", found, write, next);
 }
 

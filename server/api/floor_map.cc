@@ -5,7 +5,6 @@
 #include "base/try.h"
 #include "describe/table.h"
 #include "server/api/common_parameters.h"
-#include "server/api/csv.h"
 #include "server/api/services.h"
 
 // Energy and gap by floor square, over the missions of a period.
@@ -142,21 +141,6 @@ const Table<FloorAnswer>& floor_map_table() {
   return table;
 }
 
-Response csv_of(const Request& request, const FloorMap& map, std::size_t limit) {
-  Csv csv(request, {"x_m", "y_m", "missions", "robots", "covered_s", "distance_m", "energy_j",
-                    "energy_j_per_m", "measured_j", "modelled_j", "ratio", "departure", "departure_low",
-                    "departure_high", "stands_out"});
-  for (std::size_t k = 0; k < std::min(limit, map.cells.size()); ++k) {
-    const FloorCell& cell = map.cells[k];
-    csv.field(cell.x_m).field(cell.y_m).field(cell.missions).field(cell.robots).field(cell.covered_s);
-    csv.field(cell.distance_m).field(cell.energy_j).field(cell.energy_per_distance_j_m(map.cell_m));
-    csv.field(cell.measured_j).field(cell.modelled_j).field(ratio(cell.measured_j, cell.modelled_j));
-    csv.field(cell.departure).field(cell.interval[0]).field(cell.interval[1]).field(cell.stands_out);
-    csv.end_row();
-  }
-  return csv.response("floor-map");
-}
-
 Result<Response> floor_map(const Services& services, const Request& request) {
   history::MissionFilter filter;
   TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
@@ -173,7 +157,12 @@ Result<Response> floor_map(const Services& services, const Request& request) {
                                                           }));
   TRY_ASSIGN(const auto map, mapper.finish(read));
   const auto limit = static_cast<std::size_t>(request.query_integer("limit").value_or(usual_cells));
-  if (request.csv) return csv_of(request, map, limit);
+  if (request.csv)
+    return csv_response(request, "floor-map",
+                        {"x_m", "y_m", "missions", "robots", "covered_s", "distance_m", "energy_j",
+                         "energy_j_per_m", "measured_j", "modelled_j", "ratio", "departure",
+                         "departure_low=departure_ci/0", "departure_high=departure_ci/1", "stands_out"},
+                        squares_of({map, limit}), square_table());
   return http::json_response(floor_map_table().text({map, limit}));
 }
 

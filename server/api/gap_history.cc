@@ -74,6 +74,18 @@ const Table<history::ModelVersion>& version_table() {
   return table;
 }
 
+const Table<drift::MissionRatio>& ratio_table() {
+  static const auto table = Table<drift::MissionRatio>()
+                                .value("id", &drift::MissionRatio::mission_key, "as in /v1/missions/{id}")
+                                .time("start", &drift::MissionRatio::utime_us, start_words)
+                                .value("model_version", &drift::MissionRatio::model_version, version_words)
+                                .value("measured_j", &drift::MissionRatio::measured_j,
+                                       "energy from the battery by the sensors of voltage and current")
+                                .value("modelled_j", &drift::MissionRatio::modelled_j, "where measured")
+                                .value("ratio", &drift::MissionRatio::ratio, "measured / modelled");
+  return table;
+}
+
 const Table<GapHistory>& gap_history_table() {
   using G = GapHistory;
   static const auto sibling =
@@ -86,33 +98,16 @@ const Table<GapHistory>& gap_history_table() {
                  "robust standard deviations from the kind's median")
           .value("stands_out", &drift::SiblingRatio::stands_out,
                  "whether it differs significantly from the others");
-  static const auto ratio = Table<drift::MissionRatio>()
-                                .value("id", &drift::MissionRatio::mission_key, "as in /v1/missions/{id}")
-                                .time("start", &drift::MissionRatio::utime_us, start_words)
-                                .value("model_version", &drift::MissionRatio::model_version, version_words)
-                                .value("measured_j", &drift::MissionRatio::measured_j,
-                                       "energy from the battery by the sensors of voltage and current")
-                                .value("modelled_j", &drift::MissionRatio::modelled_j, "where measured")
-                                .value("ratio", &drift::MissionRatio::ratio, "measured / modelled");
   static const auto table =
       Table<G>("A robot's gap by mission")
           .value("robot_id", &G::robot_id, robot_words)
           .value("model_version", &G::model_version, "version in force")
           .list("missions", &G::missions, "measured over modelled energy of each mission, oldest first",
-                ratio)
+                ratio_table())
           .list("drift", &G::marks, "detected changes of the robot", answers::mark_table())
           .list("versions", &G::versions, "versions of the model, newest first", version_table())
           .list("siblings", &G::siblings, "robots of this kind, this one among them", sibling);
   return table;
-}
-
-Response gap_history_csv(const Request& request, const std::vector<drift::MissionRatio>& missions) {
-  Csv csv(request, {"id", "start", "start_utime_us", "model_version", "measured_j", "modelled_j", "ratio"});
-  for (const drift::MissionRatio& m : missions) {
-    csv.field(m.mission_key).field(utc_text(m.utime_us)).field(m.utime_us).field(m.model_version);
-    csv.field(m.measured_j).field(m.modelled_j).field(m.ratio()).end_row();
-  }
-  return csv.response("robot-" + request.param("id") + "-gap-history");
 }
 
 Result<Response> gap_history(const Services& services, const Request& request) {
@@ -120,7 +115,11 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   TRY_ASSIGN(const auto model, model_of(services, id));
   TRY_ASSIGN(auto missions, services.drift.missions(
                                 id, static_cast<std::size_t>(request.query_integer("limit").value_or(500))));
-  if (request.csv) return gap_history_csv(request, missions);
+  if (request.csv)
+    return csv_response(
+        request, "robot-" + id + "-gap-history",
+        {"id", "start", "start_utime_us", "model_version", "measured_j", "modelled_j", "ratio"}, missions,
+        ratio_table());
   TRY_ASSIGN(auto marks, services.drift.marks(id));
   TRY_ASSIGN(auto siblings, services.drift.siblings(id));
   TRY_ASSIGN(auto versions, services.store.model_versions(id));

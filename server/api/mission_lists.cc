@@ -7,10 +7,8 @@
 
 #include "answers/json/mission_json.h"
 #include "base/try.h"
-#include "base/utc_time.h"
 #include "robot/kind.h"
 #include "server/api/common_parameters.h"
-#include "server/api/csv.h"
 #include "server/api/services.h"
 #include "signals/account_ratios.h"
 
@@ -108,50 +106,29 @@ history::MissionSort sort_of(const Request& request) {
   return sort;
 }
 
-const std::vector<std::string>& accounts_titles() {
-  static const std::vector<std::string> titles{"ratio",      "wh_per_km",  "battery_j",     "measured_j",
-                                               "measured_s", "modelled_j", "unexplained_j", "drawn_j",
-                                               "returned_j", "charge_ah",  "distance_m",    "turned_rad",
-                                               "duration_s", "samples",    "gap_count",     "gap_s"};
-  return titles;
-}
-
-template <class Summed>
-void add_accounts(Csv& csv, const Summed& of) {
-  const signals::Accounts& a = of.accounts;
-  const bool measured = a.measured_s > 0;
-  csv.field(signals::energy_ratio(a)).field(signals::energy_per_distance_wh_km(a)).field(a.battery_j);
-  csv.field(measured ? a.measured_j : signals::unmeasured).field(a.measured_s).field(a.modelled_j);
-  csv.field(measured ? a.ledger[signals::Term::unexplained] : signals::unmeasured);
-  csv.field(a.drawn_j).field(a.returned_j).field(a.charge_ah).field(a.distance_m).field(a.turned_rad);
-  csv.field(a.duration_s).field(of.samples).field(of.gap_count).field(of.gap_s);
-}
-
-std::vector<std::string> titled(std::vector<std::string> first, std::vector<std::string> last = {}) {
-  first.insert(first.end(), accounts_titles().begin(), accounts_titles().end());
-  first.insert(first.end(), last.begin(), last.end());
-  return first;
-}
-
-Response list_missions_csv(const Request& request, const history::MissionPage& page) {
-  Csv csv(request, titled({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason",
-                           "start", "end", "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
-                          {"annulled", "note"}));
-  for (const history::Mission& m : page.missions) {
-    csv.field(m.key).field(m.robot_id).field(m.mission_id).field(history::name(m.state)).field(m.incomplete);
-    csv.field(m.incomplete_reason).field(utc_text(m.start_utime_us)).field(utc_text(m.end_utime_us));
-    csv.field(m.start_utime_us).field(m.end_utime_us).field(m.payload_kg).field(m.model_version);
-    add_accounts(csv, m);
-    csv.field(!history::findings_of(m).annulled.empty()).field(m.note).end_row();
-  }
-  return csv.response("missions", request, page.next_cursor);
+// Columns of missions and of sums over them, with the common ones between the others.
+std::vector<std::string> with_accounts(std::vector<std::string> columns,
+                                       const std::vector<std::string>& more = {}) {
+  for (const char* column : {"ratio", "wh_per_km", "energy/battery_j", "energy/measured_j",
+                             "energy/measured_s", "energy/modelled_j", "energy/unexplained_j",
+                             "energy/drawn_j", "energy/returned_j", "energy/charge_ah", "energy/distance_m",
+                             "energy/turned_rad", "energy/duration_s", "samples", "gap_count", "gap_s"})
+    columns.emplace_back(column);
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
 }
 
 Result<Response> list_missions(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
   TRY_ASSIGN(history::MissionPage found,
              services.store.missions(filter, page_of(request, 50), sort_of(request)));
-  if (request.csv) return list_missions_csv(request, found);
+  if (request.csv)
+    return csv_response(
+        request, "missions",
+        with_accounts({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason", "start",
+                       "end", "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
+                      {"annulled?", "note"}),
+        found.missions, answers::mission_table(), found.next_cursor);
   return page_response("missions", found.missions, answers::mission_table(), found.next_cursor);
 }
 
@@ -245,35 +222,24 @@ struct TotalsAnswer {
   std::optional<std::vector<Group>> groups;
 };
 
-const Table<TotalsAnswer>& totals_answer_table() {
+const Table<Group>& group_table() {
   constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
-  static const auto group =
+  static const auto table =
       Table<Group>()
           .texts("robots", &Group::robot_ids, "robots of the group, if grouped by robot or kind; else empty")
           .time("from", &Group::from_utime_us, time_words)
           .time("to", &Group::to_utime_us, time_words)
           .include(totals_table(), &Group::totals, "as above, of this group");
+  return table;
+}
+
+const Table<TotalsAnswer>& totals_answer_table() {
   static const auto table =
       Table<TotalsAnswer>("Sums over missions; null where no mission measured")
           .include(totals_table(), &TotalsAnswer::all)
           .list("groups", &TotalsAnswer::groups,
-                "the sums of each group that has missions; null without group_by", group);
+                "the sums of each group that has missions; null without group_by", group_table());
   return table;
-}
-
-Response totals_csv(const Request& request, const std::vector<Group>& groups) {
-  Csv csv(request, titled({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}));
-  for (const Group& group : groups) {
-    std::string robots;
-    for (const std::string& id : group.robot_ids) robots += (robots.empty() ? "" : " ") + id;
-    csv.field(robots);
-    for (const auto time : {group.from_utime_us, group.to_utime_us}) csv.field(time ? utc_text(*time) : "");
-    csv.field(group.totals.missions).field(group.totals.measured_missions);
-    csv.field(group.totals.incomplete_missions);
-    add_accounts(csv, group.totals);
-    csv.end_row();
-  }
-  return csv.response("mission-totals");
 }
 
 Result<Response> totals(const Services& services, const Request& request) {
@@ -281,7 +247,11 @@ Result<Response> totals(const Services& services, const Request& request) {
   TRY_ASSIGN(history::Totals all, services.store.totals(filter));
   TRY_ASSIGN(const std::vector<Group> groups, groups_of(services, request, filter));
   const bool grouped = request.query_value("group_by").has_value();
-  if (request.csv) return totals_csv(request, grouped ? groups : std::vector<Group>{{{}, {}, {}, all}});
+  if (request.csv)
+    return csv_response(
+        request, "mission-totals",
+        with_accounts({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}),
+        grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}, group_table());
   const TotalsAnswer answer{all, grouped ? std::optional(groups) : std::nullopt};
   return http::json_response(totals_answer_table().text(answer));
 }

@@ -10,7 +10,6 @@
 #include "robot/robot_file.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
-#include "server/api/csv.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/model_adoption.h"
@@ -307,20 +306,6 @@ const described::Table<ProposalAnswer>& proposal_table() {
   return table;
 }
 
-Response proposals_csv(const Services& services, const Request& request,
-                       const std::vector<history::Proposal>& proposals,
-                       const std::map<std::int64_t, std::string>& dismissed, std::string_view next_cursor) {
-  Csv csv(request, {"id", "robot_id", "created", "created_utime_us", "kind", "state", "closed_reason", "note",
-                    "base_version", "adopted_version"});
-  for (const history::Proposal& p : proposals) {
-    csv.field(p.id).field(p.robot_id).field(utc_text(p.created_utime_us)).field(p.created_utime_us);
-    csv.field(p.kind).field(history::name(state_of(services, p)));
-    csv.field(closed_reason(services, p, dismissed).value_or("")).field(p.note).field(p.base_version);
-    csv.field(p.adopted_version).end_row();
-  }
-  return csv.response("proposals", request, next_cursor);
-}
-
 Result<Response> proposals_of(const Services& services, const Request& request,
                               const std::optional<std::string>& id) {
   TRY_ASSIGN(const auto cursor, id_cursor(request));
@@ -328,10 +313,14 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   TRY_ASSIGN(const auto found, services.store.proposals(id, cursor.value_or(history::whole_future), limit));
   const std::string next = next_id_cursor(found, limit, &history::Proposal::id);
   const auto dismissed = dismissals(services, found);
-  if (request.csv) return proposals_csv(services, request, found, dismissed, next);
   const auto write = [&](JsonWriter& out, const history::Proposal& proposal) {
     proposal_table().write(out, {services, proposal, dismissed});
   };
+  if (request.csv)
+    return csv_response(request, "proposals",
+                        {"id", "robot_id", "created", "created_utime_us", "kind", "state", "closed_reason",
+                         "note", "base_version", "adopted_version"},
+                        found, write, next);
   return page_response("proposals", found, write, next, [&](JsonWriter& out) { out.field("robot_id", id); });
 }
 

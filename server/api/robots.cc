@@ -8,13 +8,11 @@
 #include <utility>
 
 #include "base/try.h"
-#include "base/utc_time.h"
 #include "describe/table.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
-#include "server/api/csv.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 
@@ -28,79 +26,20 @@ using http::Response;
 
 constexpr std::int64_t max_listed_robots = 10'000;  // a page
 
-// Present state of a robot and its remaining range.
-struct KnownState {
-  ingest::RobotSnapshot snapshot;
-  std::optional<forecast::Reach> reach;
-};
-
-KnownState known_state(const Services& services, const std::string& robot_id) {
-  const auto model = services.models.find(robot_id);
-  auto snapshot = services.fleet.find(robot_id);
-  ingest::RobotSnapshot silent;
-  if (snapshot == nullptr) {
-    silent.robot_id = robot_id;
-    silent.has_model = model != nullptr;
-    silent.model_version = model != nullptr ? model->version : 0;
-  }
-  // Without telemetry since the start, the state is the last stored one; the model may have changed since.
-  if (snapshot != nullptr && snapshot->samples == 0) {
-    silent = *snapshot;
-    silent.has_model = model != nullptr;
-    silent.model_version = model != nullptr ? model->version : 0;
-    snapshot.reset();
-  }
-  KnownState known{snapshot != nullptr ? *snapshot : silent, std::nullopt};
-  if (model != nullptr) known.reach = services.forecasts.reach(model, known.snapshot);
-  return known;
-}
-
 void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
-  const KnownState known = known_state(services, robot_id);
-  state_table().write(json, {known.snapshot, known.reach, services.now_utime_us()});
-}
-
-Csv fleet_csv(const Request& request) {
-  return {request,
-          {"robot_id",
-           "live",
-           "silent_s",
-           "time",
-           "utime_us",
-           "has_model",
-           "model_version",
-           "measured_power_w",
-           "modelled_power_w",
-           "speed_m_s",
-           "yaw_rate_rad_s",
-           "x_m",
-           "y_m",
-           "heading_rad",
-           "payload_kg",
-           "battery_voltage_v",
-           "battery_current_a",
-           "state_of_charge",
-           "state_of_charge_sd",
-           "range_m",
-           "run_time_s",
-           "mission_id",
-           "samples"}};
-}
-
-void add_row(Csv& csv, const KnownState& known, std::int64_t now_utime_us) {
-  const ingest::RobotSnapshot& s = known.snapshot;
-  const std::int64_t heard_us = s.sample.utime_us;
-  csv.field(s.robot_id).field(is_live(s, now_utime_us)).field(silence_s(s, now_utime_us));
-  csv.field(heard_us != 0 ? utc_text(heard_us) : "")
-      .field(heard_us != 0 ? std::optional(heard_us) : std::nullopt);
-  csv.field(s.has_model).field(s.has_model ? std::optional(s.model_version) : std::nullopt);
-  csv.field(s.measured_power_w).field(s.modelled_power_w).field(s.speed_m_s).field(s.yaw_rate_rad_s);
-  for (const double place : s.sample.pose) csv.field(place);
-  csv.field(s.sample.payload_kg).field(s.sample.battery_voltage_v).field(s.sample.battery_current_a);
-  csv.field(s.state_of_charge).field(s.charge.estimate.sd);
-  csv.field(known.reach ? known.reach->range_m[1] : signals::unmeasured);
-  csv.field(known.reach ? known.reach->run_time_s[1] : signals::unmeasured);
-  csv.field(s.mission_id).field(static_cast<std::int64_t>(s.samples)).end_row();
+  const auto model = services.models.find(robot_id);
+  const auto kept = services.fleet.find(robot_id);
+  ingest::RobotSnapshot state;
+  if (kept != nullptr) state = *kept;
+  // Without telemetry since the start, the state is the last stored one; the model may have changed since.
+  if (kept == nullptr || kept->samples == 0) {
+    state.robot_id = robot_id;
+    state.has_model = model != nullptr;
+    state.model_version = model != nullptr ? model->version : 0;
+  }
+  std::optional<forecast::Reach> reach;
+  if (model != nullptr) reach = services.forecasts.reach(model, state);
+  state_table().write(json, {state, reach, services.now_utime_us()});
 }
 
 Result<Response> list_robots(const Services& services, const Request& request) {
@@ -108,12 +47,33 @@ Result<Response> list_robots(const Services& services, const Request& request) {
   for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
   const auto [page, next] = page_of_ids(request, ids, max_listed_robots);
-  if (request.csv) {
-    Csv csv = fleet_csv(request);
-    for (const std::string& id : page) add_row(csv, known_state(services, id), services.now_utime_us());
-    return csv.response("robots", request, next);
-  }
   const auto write = [&](JsonWriter& json, const std::string& id) { write_robot_state(json, services, id); };
+  if (request.csv)
+    return csv_response(request, "robots",
+                        {"robot_id",
+                         "live",
+                         "silent_s",
+                         "time",
+                         "utime_us",
+                         "has_model",
+                         "model_version",
+                         "measured_power_w",
+                         "modelled_power_w",
+                         "speed_m_s",
+                         "yaw_rate_rad_s",
+                         "x_m=pose/0",
+                         "y_m=pose/1",
+                         "heading_rad=pose/2",
+                         "payload_kg",
+                         "battery_voltage_v",
+                         "battery_current_a",
+                         "state_of_charge",
+                         "state_of_charge_sd",
+                         "range_m",
+                         "run_time_s",
+                         "mission/mission_id",
+                         "samples"},
+                        page, write, next);
   return page_response("robots", page, write, next);
 }
 

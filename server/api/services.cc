@@ -1,9 +1,6 @@
 #include "server/api/services.h"
 
 #include <iterator>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "answers/json/autonomy_json.h"
 #include "answers/json/estimate_json.h"
@@ -15,7 +12,6 @@
 #include "server/api/common_parameters.h"
 #include "server/api/requests.h"
 #include "server/api/robot_json.h"
-#include "server/diagnosis/model_adoption.h"
 #include "server/http/gate.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"

@@ -7,7 +7,6 @@
 
 #include "answers/json/mission_json.h"
 #include "base/try.h"
-#include "energy/back_test.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -267,7 +266,7 @@ Result<DiagnosedModel> diagnosed_model(const history::Store& store, const histor
   TRY_ASSIGN(const robot::RobotModel robot, robot::parse_robot(version.model_json));
   Result<robot::RobotModel> model = gap::take(offer, robot, choice);
   if (!model) return tl::unexpected(as_of_request(std::move(model.error()), offer));
-  return DiagnosedModel{std::move(*model), offer.choice_settles ? "" : offer.refusal};
+  return DiagnosedModel{std::move(*model), offer.refusal};
 }
 
 }  // namespace joulecast::server

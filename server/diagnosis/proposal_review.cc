@@ -7,7 +7,6 @@
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "robot/robot_file.h"
-#include "server/diagnosis/model_adoption.h"
 
 namespace joulecast::server {
 namespace {

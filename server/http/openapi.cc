@@ -12,7 +12,6 @@
 #include "server/http/delivery.h"
 #include "server/http/gate.h"
 #include "server/http/problem.h"
-#include "server/http/router.h"
 #include "server/http/text.h"
 #include "server/http/uri.h"
 

@@ -1,6 +1,5 @@
 #include "server/http/operations.h"
 
-#include <functional>
 #include <memory>
 #include <utility>
 

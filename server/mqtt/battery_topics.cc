@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
-#include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/json_writer.h"

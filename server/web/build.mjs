@@ -1,6 +1,6 @@
 // Bundles source/ into the files that joulecastd embeds. With --check: fails when they are not what the
 // sources give. With --watch: bundles again on every change.
-import { build, context } from 'esbuild';
+import { build, context } from 'esbuild-wasm';
 import { readFile, writeFile } from 'node:fs/promises';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
@@ -92,8 +92,7 @@ async function products() {
   const files = new Map(
     outputFiles.map((file) => [inAll(path.basename(file.path)), Buffer.from(inAll(file.text))]),
   );
-  for (const name of ['index.html', 'favicon.svg'])
-    files.set(name, await readFile(path.join(here, 'source', name)));
+  for (const name of ['index.html', 'favicon.svg']) files.set(name, await readFile(path.join(here, name)));
   files.set('third_party.txt', Buffer.from(await thirdParty()));
   files.set('report.template', Buffer.from(await reportTemplate()));
   return files;

@@ -9,7 +9,6 @@
 #include <cstring>
 
 #include "base/text_file.h"
-#include "base/try.h"
 
 namespace joulecast::access {
 namespace {

@@ -188,8 +188,8 @@ Result<forecast::Charge> charge_of(const std::optional<double>& given, const std
   const double charge = given.value_or(now.state_of_charge);
   if (!std::isfinite(charge)) {
     return fail(Fault::infeasible, "/state_of_charge",
-                "is not known: the robot has reported no battery voltage and current since it was first "
-                "seen; give it in the request");
+                "is unknown: the robot has never reported battery voltage and current; state it in the "
+                "request");
   }
   const double live_sd = std::isfinite(now.state_of_charge_sd) ? now.state_of_charge_sd : 0;
   return forecast::Charge{charge, given_sd.value_or(given ? 0 : live_sd),

@@ -213,7 +213,7 @@ std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r,
     case Obstacle::limits:
       return limits ? describe(*limits) : std::string("no motion within the limits");
     case Obstacle::pose:
-      return "the robot reports no pose; give it in the request, or the way to the pick-up";
+      return "the robot reports no pose; state it in the request, or the way to the pick-up";
     case Obstacle::model:
       return robots[r].problem;
   }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -23,11 +22,6 @@ inline double number_or_nan(const nlohmann::json& value) {
 inline double number_at(const nlohmann::json& object, const char* name) {
   const auto found = object.find(name);
   return found != object.end() ? number_or_nan(*found) : std::nan("");
-}
-
-// The ends of an interval, lower first.
-inline nlohmann::json json_interval(const std::array<double, 2>& ends) {
-  return nlohmann::json::array({json_number(ends[0]), json_number(ends[1])});
 }
 
 }  // namespace joulecast

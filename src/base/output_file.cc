@@ -47,7 +47,7 @@ Result<void> may_write(const std::string& field, const std::string& path, Existi
   if (there == 0) return {};
   return fail(Fault::conflict, field,
               path + (S_ISLNK(there) ? " is a symbolic link; --force puts a file in its place"
-                                     : " is there already; --force writes over it"));
+                                     : " already exists; --force overwrites it"));
 }
 
 OutputFile::OutputFile(std::FILE* file, std::string path, std::string part, Existing existing)

@@ -1,6 +1,5 @@
 #include "battery/charge_tracker.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "base/units.h"

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "base/units.h"
-#include "battery/cell_shapes.h"
 
 namespace joulecast::battery {
 namespace {

@@ -179,11 +179,10 @@ std::vector<std::string> sentences(const Coverage& seen) {
   std::vector<std::string> all{of_rates(seen)};
   for (const Coverage::Temperature& t : seen.unseen_temperatures) all.push_back(of_temperature(seen, t));
   if (seen.lowest_charge > 0.05)
-    all.push_back(
-        fmt::format("less than {:.0f} % of the charge was not tested under load; the resistance is "
-                    "assumed constant there, while that of cells rises: the end of a discharge under "
-                    "load is less certain",
-                    1e2 * seen.lowest_charge));
+    all.push_back(fmt::format(
+        "charges below {:.0f} % were not tested under load; the resistance is assumed "
+        "constant there, but that of cells rises: the end of a discharge under load is less certain",
+        1e2 * seen.lowest_charge));
   all.push_back(seen.charging
                     ? "charging was recorded and is not used; its losses are assumed to be those of "
                       "discharging, and its whole current to be stored"

@@ -136,7 +136,7 @@ Result<Discharge> discharge(const Circuit& circuit, const State& start, const Lo
                             const DischargeLimits& limits) {
   if (!finite(start)) return invalid("start", "has a number that is not finite");
   Problem problem(circuit, limits, load.kind);
-  energy::Cvode cvode(size, energy::Method::adams, problem);
+  energy::Cvode cvode(size, problem);
   const std::span<double> y = cvode.state();
   std::fill(y.begin(), y.end(), 0.0);
   y[charge_at] = start.charge;
@@ -173,12 +173,6 @@ Result<Discharge> discharge(const Circuit& circuit, const State& start, const Lo
   out.charge_ah = y[drawn_at];
   out.energy_j = y[energy_at];
   return out;
-}
-
-double Load::duration_s() const {
-  double total = 0;
-  for (const Piece& piece : pieces) total += piece.duration_s;
-  return total;
 }
 
 Result<Load> held_load(Load::Kind kind, std::span<const double> time_s, std::span<const double> value) {

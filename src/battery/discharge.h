@@ -22,8 +22,6 @@ struct Load {
 
   Kind kind = Kind::power;
   std::vector<Piece> pieces;
-
-  double duration_s() const;
 };
 
 // value[i] holds over (time_s[i-1], time_s[i]]; value[0] is not used. Times strictly ascending, at least two,

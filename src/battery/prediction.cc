@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "base/try.h"
-#include "battery/discharge.h"
 
 namespace joulecast::battery {
 namespace {

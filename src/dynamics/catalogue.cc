@@ -6,18 +6,30 @@
 
 #include "base/bounds.h"
 #include "base/nearest_word.h"
-#include "dynamics/effect_list.h"
+#include "dynamics/effects/battery_side.h"
+#include "dynamics/effects/inertia.h"
+#include "dynamics/effects/kinematics.h"
+#include "dynamics/effects/motor.h"
+#include "dynamics/effects/sensors.h"
+#include "dynamics/effects/wheel_torque.h"
 
 namespace joulecast::dynamics {
 namespace {
 
 template <class... Effects>
-std::array<const Effect*, sizeof...(Effects)> table_of(EffectList<Effects...>) {
+std::array<const Effect*, sizeof...(Effects)> table_of() {
   static const std::tuple<EffectOf<Effects>...> effects;
   return {&std::get<EffectOf<Effects>>(effects)...};
 }
 
-const std::array table = table_of(AllEffects{});
+// In the order in which they are applied.
+const std::array table =
+    table_of<CoulombFriction, ViscousFriction, StribeckFriction, FrictionAsymmetry, LoadRollingResistance,
+             FloorResistanceZone, Slope, Grade, AerodynamicDrag, TurningScrub, GearEfficiency,
+             ChassisMassError, PayloadMassError, YawInertiaError, LinearInertiaError, ComOffset,
+             ResistanceError, WindingTemperature, BrushDrop, TorqueConstantLoss, Inductance, AccessoryLoad,
+             DriverLoss, NoRegeneration, BatteryResistance, WheelRadiusError, WheelRadiusAsymmetry,
+             TrackError, WheelSlip, CurrentSensorGain, CurrentSensorBias, VoltageSensorGain, SensorDelay>();
 
 }  // namespace
 

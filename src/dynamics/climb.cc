@@ -107,10 +107,6 @@ double HeightProfile::slope(double from_m, double to_m) const {
   return 12 * moment / (length * length * length);
 }
 
-void ClimbTracker::reset() {
-  *this = ClimbTracker();
-}
-
 void ClimbTracker::learn(double step_m) {
   steps_m_[steps_++ % remembered_steps] = step_m;
   std::array<double, remembered_steps> sorted = steps_m_;

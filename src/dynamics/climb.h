@@ -39,7 +39,6 @@ class HeightProfile {
   void clear();
 
   double begin_m() const { return knots_.empty() ? 0 : knots_.front().way_m; }
-  double end_m() const { return last_way_m_; }
   // The slope of the straight line that fits the profile best over [from, to]; from < to, both within it.
   double slope(double from_m, double to_m) const;
   // Removes the profile before `way_m`; of more than a thousand heights at least the older half.
@@ -62,7 +61,6 @@ class ClimbTracker {
  public:
   // Readings in order of time; a gap restarts the window.
   double add(const ClimbReading& reading);
-  void reset();
 
  private:
   void learn(double step_m);

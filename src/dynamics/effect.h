@@ -78,8 +78,8 @@ inline constexpr std::size_t max_effect_parameters = 5;
 template <class S>
 using EffectValues = std::array<S, max_effect_parameters>;
 
-// A physical effect that the nominal model leaves out. Implementations are the small files in effects/: a
-// struct with a static `info()` and whichever of these static templates it needs:
+// A physical effect that the nominal model leaves out. Implementations are in effects/: a struct
+// with a static `info` and whichever of these static templates it needs:
 //   adjust(values, Parameters<S>&)                      changes constants
 //   load(values, const LoadContext<S>&, Loads<S>&)      adds torque at the wheels
 // Both are instantiated for double and for Dual, so that every derivative is exact.

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <array>
-
-#include "robot/robot_model.h"
-
 namespace joulecast::dynamics {
 
 // Power of a motion along one coordinate x with speed w and acceleration a, thesis (4-1):
@@ -21,12 +17,6 @@ struct QuadraticPower {
     return (c1 * acceleration + cx * speed + ca) * acceleration + (c2 * speed + c3) * speed + c0;
   }
 
-  // The same power over the coordinate y = scale * x.
-  QuadraticPower rescaled(double scale) const {
-    const double s = 1 / scale;
-    return {c1 * s * s, cx * s * s, ca * s, c2 * s * s, c3 * s, c0};
-  }
-
   QuadraticPower& operator+=(const QuadraticPower& b) {
     c1 += b.c1, cx += b.cx, ca += b.ca, c2 += b.c2, c3 += b.c3, c0 += b.c0;
     return *this;
@@ -35,20 +25,13 @@ struct QuadraticPower {
 
 // One wheel with a motor torque T = inertia a + damping w + friction [N m] at the wheel:
 // P = rho T^2 + kappa w T with rho = R/(K_t n)^2 and kappa = K_w/K_t (thesis, motion on a straight line).
-QuadraticPower wheel_power(double rho_w_n2_m2, double kappa, double inertia_kg_m2, double damping_nm_s_rad,
-                           double friction_nm);
-
-// Electrical power of the motors on a straight line, over the wheel angle [rad], idle power left out.
-// Thesis (3-2), (3-3) for each side and (4-1) for `both`, with J = I_w + I_s + m r^2/2; the term in a^2 m_p^2
-// that the thesis drops is included. Without the effects of the robot file; the planner uses the drive model.
-struct StraightPower {
-  std::array<QuadraticPower, 2> side;
-  QuadraticPower both;
-  double wheel_radius_m = 0;
-
-  QuadraticPower over_distance() const { return both.rescaled(wheel_radius_m); }
-};
-
-StraightPower straight_power(const robot::RobotModel& robot, double payload_kg);
+inline QuadraticPower wheel_power(double rho, double kappa, double inertia, double damping, double friction) {
+  return {rho * inertia * inertia,
+          2 * rho * inertia * damping + kappa * inertia,
+          2 * rho * inertia * friction,
+          rho * damping * damping + kappa * damping,
+          2 * rho * damping * friction + kappa * friction,
+          rho * friction * friction};
+}
 
 }  // namespace joulecast::dynamics

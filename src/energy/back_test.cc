@@ -1,9 +1,7 @@
 #include "energy/back_test.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <optional>
 #include <random>
 #include <utility>
 

@@ -4,8 +4,6 @@
 #include <cvode/cvode.h>
 #include <nvector/nvector_serial.h>
 #include <sundials/sundials_context.h>
-#include <sunlinsol/sunlinsol_dense.h>
-#include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
@@ -69,14 +67,11 @@ struct SundialsProblem {
 };
 
 struct Cvode::Impl : SundialsProblem {
-  SUNMatrix matrix = nullptr;
-  SUNLinearSolver linear = nullptr;
   SUNNonlinearSolver nonlinear = nullptr;
   void* memory = nullptr;
 
-  Impl(std::size_t n, Method method, InitialValueProblem& of) : SundialsProblem(n, of) {
-    const auto length = static_cast<sunindextype>(n);
-    require((memory = CVodeCreate(method == Method::adams ? CV_ADAMS : CV_BDF, context)) != nullptr);
+  Impl(std::size_t n, InitialValueProblem& of) : SundialsProblem(n, of) {
+    require((memory = CVodeCreate(CV_ADAMS, context)) != nullptr);
     require(CVodeInit(memory, &Impl::rate, 0, y) == CV_SUCCESS);
     require(CVodeSetUserData(memory, self()) == CV_SUCCESS);
     require(CVodeWFtolerances(memory, &Impl::weights) == CV_SUCCESS);
@@ -86,21 +81,13 @@ struct Cvode::Impl : SundialsProblem {
       require(CVodeRootInit(memory, static_cast<int>(problem.event_count()), &Impl::events) == CV_SUCCESS);
       require(CVodeSetNoInactiveRootWarn(memory) == CV_SUCCESS);
     }
-    if (method == Method::adams) {
-      require((nonlinear = SUNNonlinSol_FixedPoint(y, 0, context)) != nullptr);
-      require(CVodeSetNonlinearSolver(memory, nonlinear) == CV_SUCCESS);
-    } else {
-      require((matrix = SUNDenseMatrix(length, length, context)) != nullptr);
-      require((linear = SUNLinSol_Dense(y, matrix, context)) != nullptr);
-      require(CVodeSetLinearSolver(memory, linear, matrix) == CV_SUCCESS);
-    }
+    require((nonlinear = SUNNonlinSol_FixedPoint(y, 0, context)) != nullptr);
+    require(CVodeSetNonlinearSolver(memory, nonlinear) == CV_SUCCESS);
   }
 
   ~Impl() {
     if (memory != nullptr) CVodeFree(&memory);
     if (nonlinear != nullptr) SUNNonlinSolFree(nonlinear);
-    if (linear != nullptr) SUNLinSolFree(linear);
-    if (matrix != nullptr) SUNMatDestroy(matrix);
   }
 
   static int events(sunrealtype t, N_Vector y, sunrealtype* value, void* self) {
@@ -116,11 +103,10 @@ struct Cvode::Impl : SundialsProblem {
   }
 
   // Restarts at t0 and integrates towards t1; the flag distinguishes an event from the end.
-  Result<int> run(double t0, double t1, double first_step, double& reached) {
+  Result<int> run(double t0, double t1, double& reached) {
     if (!(t1 > t0)) return invalid("t1", "must be after t0");
     message.clear();
     TRY(check(CVodeReInit(memory, t0, y)));
-    TRY(check(CVodeSetInitStep(memory, first_step)));
     TRY(check(CVodeSetStopTime(memory, t1)));
     reached = t0;
     const int flag = CVode(memory, t1, y, &reached, CV_NORMAL);
@@ -132,29 +118,26 @@ struct Cvode::Impl : SundialsProblem {
   }
 };
 
-Cvode::Cvode(std::size_t size, Method method, InitialValueProblem& problem)
-    : impl_(std::make_unique<Impl>(size, method, problem)) {}
+Cvode::Cvode(std::size_t size, InitialValueProblem& problem) : impl_(std::make_unique<Impl>(size, problem)) {}
 Cvode::~Cvode() = default;
-Cvode::Cvode(Cvode&&) noexcept = default;
-Cvode& Cvode::operator=(Cvode&&) noexcept = default;
 
 std::span<double> Cvode::state() {
   return Impl::values(impl_->y);
 }
 
-Result<void> Cvode::advance(double t0, double t1, double first_step) {
+Result<void> Cvode::advance(double t0, double t1) {
   double from = t0;
   for (;;) {  // events are passed over
     double reached = from;
-    TRY_ASSIGN(const int flag, impl_->run(from, t1, first_step, reached));
+    TRY_ASSIGN(const int flag, impl_->run(from, t1, reached));
     if (flag != CV_ROOT_RETURN || reached == t1) return {};
     from = reached;
   }
 }
 
-Result<Arrival> Cvode::advance_to_event(double t0, double t1, double first_step) {
+Result<Arrival> Cvode::advance_to_event(double t0, double t1) {
   double reached = t0;
-  TRY_ASSIGN(const int flag, impl_->run(t0, t1, first_step, reached));
+  TRY_ASSIGN(const int flag, impl_->run(t0, t1, reached));
   if (flag != CV_ROOT_RETURN) return Arrival{reached, std::nullopt};
   std::vector<int> signs(impl_->problem.event_count());
   CVodeGetRootInfo(impl_->memory, signs.data());
@@ -164,18 +147,6 @@ Result<Arrival> Cvode::advance_to_event(double t0, double t1, double first_step)
 
 void Cvode::limit_step(double longest) {
   Impl::require(CVodeSetMaxStep(impl_->memory, longest) == CV_SUCCESS);
-}
-
-long Cvode::steps() const {
-  long count = 0;
-  CVodeGetNumSteps(impl_->memory, &count);
-  return count;
-}
-
-long Cvode::evaluations() const {
-  long count = 0;
-  CVodeGetNumRhsEvals(impl_->memory, &count);
-  return count;
 }
 
 struct Erk::Impl : SundialsProblem {
@@ -254,12 +225,6 @@ Result<void> Erk::advance(double t0, double t1) {
   if (flag >= 0 && reached == t1) return {};
   return fail(Fault::internal, "erkstep",
               of.message.empty() ? "ended with flag " + std::to_string(flag) : of.message);
-}
-
-long Erk::evaluations() const {
-  long count = 0;
-  ERKStepGetNumRhsEvals(impl_->memory, &count);
-  return count;
 }
 
 }  // namespace joulecast::energy

@@ -5,7 +5,6 @@
 
 #include "base/try.h"
 #include "base/units.h"
-#include "energy/rates.h"
 
 namespace joulecast::energy {
 namespace {

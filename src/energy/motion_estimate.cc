@@ -106,7 +106,7 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           const std::optional<StartPose>& start) {
   if (points.size() < 2) return invalid("time_s", "must have at least 2 points");
   MotionSpan span(model, payload_kg, start.has_value());
-  Cvode cvode(motion_state_size, Method::adams, span);
+  Cvode cvode(motion_state_size, span);
   const std::span<double> y = cvode.state();
   if (start) {
     y[pose_index] = start->x_m;
@@ -122,7 +122,7 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
     const double duration = points[k].time_s - points[k - 1].time_s;
     const double fastest = std::max(std::fabs(points[k].speed_m_s), std::fabs(points[k - 1].speed_m_s));
     cvode.limit_step(start && fastest > 0 ? finest_floor_m / fastest : 0);
-    TRY(cvode.advance(0, duration, 0));
+    TRY(cvode.advance(0, duration));
   }
 
   signals::Accounts a;

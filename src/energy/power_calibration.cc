@@ -5,16 +5,12 @@
 #include <array>
 #include <bitset>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <map>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "base/try.h"
-#include "energy/power_windows.h"
 #include "statistics/regression.h"
 #include "statistics/robust.h"
 

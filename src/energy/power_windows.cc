@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "dynamics/drive_model.h"
 #include "energy/wheel_inertia.h"
 
 namespace joulecast::energy {

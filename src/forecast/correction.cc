@@ -54,11 +54,12 @@ double Correction::variance_j2(const Features& x) const {
   return column(x).dot(square(covariance) * column(x));
 }
 
-Correction untried() {
+Correction untried(Subject subject) {
   Correction prior;
-  constexpr Features deviation{0.15, 0.25, 0.25, 0.35, 0.1};
+  constexpr Features energies{0.15, 0.25, 0.25, 0.35, 0.1}, durations{0.05, 0.05, 0.05, 0.02, 0.05};
+  const Features& deviation = is_duration(subject) ? durations : energies;
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
-  constexpr double correlation = 0.5;
+  const double correlation = is_duration(subject) ? 0 : 0.5;
   const auto correlate = [&](std::size_t a, std::size_t b, double by) {
     prior.covariance[a][b] = prior.covariance[b][a] = by * deviation[a] * deviation[b];
   };

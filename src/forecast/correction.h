@@ -8,6 +8,32 @@
 
 namespace joulecast::forecast {
 
+// What a plan states of a leg: cruise and ramps, the cruise alone, or neither. The rest follows the habit.
+enum class Driving { stated, paced, usual };
+
+// Subjects that are learned of a robot: its energy and its duration by what a plan states of legs.
+enum class Subject {
+  stated_energy,
+  paced_energy,
+  usual_energy,
+  stated_duration,
+  paced_duration,
+  usual_duration
+};
+inline constexpr std::size_t driving_count = 3, subject_count = 6;
+constexpr Subject energy_of(Driving driving) {
+  return static_cast<Subject>(driving);
+}
+constexpr Subject duration_of(Driving driving) {
+  return static_cast<Subject>(static_cast<std::size_t>(driving) + driving_count);
+}
+constexpr bool is_duration(Subject subject) {
+  return subject >= Subject::stated_duration;
+}
+constexpr Driving driving_of(Subject subject) {
+  return static_cast<Driving>(static_cast<std::size_t>(subject) % driving_count);
+}
+
 // Parts of a robot's energy, in joules of its model: standing, driving, turning in place, driving weighted by
 // payload over its limit, driving weighted by speed over its limit less 0.6.
 inline constexpr std::size_t feature_count = 5, payload_feature = 3;
@@ -26,14 +52,17 @@ struct Correction {
   double variance_j2(const Features& x) const;
 };
 
-// The prior of an unmeasured robot: standard deviations of 15 % of its standing power, 25 % of driving and of
-// turning (with 15 % intervals covered 78 % after one mission of robots that do not follow their plans, with
-// 25 % 96 %, with 30 % 99 %), 10 % of the factor of speed and 35 % of that of payload, as robot files rarely
-// contain the rolling resistance of payloads (with 15 % the intervals of first payloads covered 60 %, with 30
-// % 84 to 94 %, with 40 % 97 %). The factors of turning and of payload have a correlation of 0.5 with that of
-// driving, as friction that is above the file's is so for all, and none beyond that: first payloads took 3.1
-// % more than their median forecast without, 1.4 % with 0.3 and 0.2 % with 0.5.
-Correction untried();
+// The prior of an unmeasured robot. Of its energies, standard deviations of 15 % of its standing power, 25 %
+// of driving and of turning (with 15 % intervals covered 78 % after one mission of robots that do not follow
+// their plans, with 25 % 96 %, with 30 % 99 %), 10 % of the factor of speed and 35 % of that of payload, as
+// robot files rarely contain the rolling resistance of payloads (with 15 % the intervals of first payloads
+// covered 60 %, with 30 % 84 to 94 %, with 40 % 97 %). The factors of turning and of payload have a
+// correlation of 0.5 with that of driving, as friction that is above the file's is so for all, and none
+// beyond that: first payloads took 3.1 % more than their median forecast without, 1.4 % with 0.3 and 0.2 %
+// with 0.5. Of its durations, 5 % of driving, turning and speed and 2 % of payload: after 30 missions 100
+// robots of an independent plant and 24 virtual ones have learned factors whose root mean squares are at most
+// 0.04, 0.03, 0.05 and 0.02. Their drives are as long as planned or usual, with any payload.
+Correction untried(Subject subject);
 
 // Each factor's prior is a t distribution of 5 degrees of freedom, which far evidence overrules: a normal one
 // of uncertain precision. The expected share of the prior's precision, of a factor that is estimated `off`

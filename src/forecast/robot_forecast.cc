@@ -167,7 +167,9 @@ RobotForecast::RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive
     : robot_(std::move(robot)),
       drive_(std::move(drive)),
       habit_(habit_of(robot_, {})),
-      standing_w_(drive_.battery_power_for({0, 0})) {}
+      standing_w_(drive_.battery_power_for({0, 0})) {
+  for (std::size_t k = 0; k < subject_count; ++k) siblings_[k] = pool(static_cast<Subject>(k), {});
+}
 
 void RobotForecast::set_model(robot::RobotModel robot, dynamics::DriveModel drive) {
   robot_ = std::move(robot);
@@ -205,7 +207,7 @@ void RobotForecast::learn_anew() {
 std::array<OwnFinding, subject_count> RobotForecast::findings() const {
   std::array<OwnFinding, subject_count> found;
   for (std::size_t k = 0; k < subject_count; ++k) {
-    found[k].correction = learning_[k].fit.posterior(untried());
+    found[k].correction = learning_[k].fit.posterior(untried(static_cast<Subject>(k)));
     found[k].scatter = scatter(static_cast<Subject>(k), assumed[k]);
     found[k].habit = habit_;
     found[k].scores = learning_[k].scores.entries();

@@ -6,15 +6,16 @@
 namespace joulecast::forecast {
 namespace {
 
-constexpr double between = 0.05;      // standard deviation between robots that is assumed
+constexpr double between = 0.2;       // standard deviation between robots that is assumed, of the prior's
 constexpr double between_weight = 3;  // robots that the assumption counts for
 constexpr std::int64_t least_missions = 3;
 constexpr std::size_t scores_each = 40;
 
 }  // namespace
 
-Siblings pool(std::span<const OwnFinding* const> others) {
-  Siblings siblings;
+Siblings pool(Subject subject, std::span<const OwnFinding* const> others) {
+  const Correction start = untried(subject);
+  Siblings siblings{start, {}, 0, {}, {}};
   std::vector<const OwnFinding*> known;
   for (const OwnFinding* finding : others)
     if (finding->missions >= least_missions) known.push_back(finding);
@@ -32,9 +33,9 @@ Siblings pool(std::span<const OwnFinding* const> others) {
   for (std::size_t k = 0; k < motion_count; ++k)
     scatter.legs[k] = root_mean_square([k](const Scatter& s) { return s.legs[k]; });
   scatter.common = root_mean_square([](const Scatter& s) { return s.common; });
-  const Correction start = untried();
   for (std::size_t k = 0; k < feature_count; ++k) {
-    double spread = between * between, mean = start.mean[k], variance = start.covariance[k][k];
+    const double assumed = between * between * start.covariance[k][k];
+    double spread = assumed, mean = start.mean[k], variance = start.covariance[k][k];
     for (int round = 0; round < prior_rounds; ++round) {
       const double off = mean - start.mean[k], prior_variance = start.covariance[k][k];
       double weight = prior_share(off, variance, prior_variance) / prior_variance;
@@ -46,7 +47,7 @@ Siblings pool(std::span<const OwnFinding* const> others) {
       }
       mean = sum / weight;
       variance = 1 / weight;
-      double beyond = between_weight * between * between;
+      double beyond = between_weight * assumed;
       for (const OwnFinding* finding : known) {
         const double apart = finding->correction.mean[k] - mean;
         beyond += std::max(0.0, apart * apart - finding->correction.covariance[k][k]);

@@ -6,7 +6,6 @@
 #include <array>
 #include <bit>
 #include <cassert>
-#include <cstdint>
 #include <map>
 #include <memory>
 #include <new>

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <array>
+#include <boost/preprocessor/seq/for_each.hpp>
+#include <boost/preprocessor/stringize.hpp>
+#include <boost/preprocessor/variadic/to_seq.hpp>
 #include <concepts>
 #include <string>
 #include <type_traits>
@@ -16,6 +19,11 @@ namespace joulecast::history {
 struct NullIfEmpty {};
 struct AsBytes {};
 
+// Members whose columns have their names.
+#define VISIT_MEMBER(unused, record, member) visit(BOOST_PP_STRINGIZE(member), record.member);
+#define VISIT_MEMBERS(record, ...) \
+  BOOST_PP_SEQ_FOR_EACH(VISIT_MEMBER, record, BOOST_PP_VARIADIC_TO_SEQ(__VA_ARGS__))
+
 template <class T, class Record>
 concept Is = std::same_as<std::remove_const_t<T>, Record>;
 
@@ -24,21 +32,14 @@ const std::array<std::string, signals::term_count>& ledger_columns();
 
 template <Is<signals::Accounts> A, class Visit>
 void visit_columns(A& a, Visit&& visit) {
-  visit("battery_j", a.battery_j);
-  visit("measured_j", a.measured_j);
-  visit("measured_s", a.measured_s);
+  VISIT_MEMBERS(a, battery_j, measured_j, measured_s);
   visit("measured_motor_right_j", a.measured_motor_j[0]);
   visit("measured_motor_left_j", a.measured_motor_j[1]);
   visit("motor_measured_s", a.motor_measured_s);
   visit("modelled_j", a.modelled_j);
   visit("modelled_motor_right_j", a.modelled_motor_j[0]);
   visit("modelled_motor_left_j", a.modelled_motor_j[1]);
-  visit("drawn_j", a.drawn_j);
-  visit("returned_j", a.returned_j);
-  visit("charge_ah", a.charge_ah);
-  visit("distance_m", a.distance_m);
-  visit("turned_rad", a.turned_rad);
-  visit("duration_s", a.duration_s);
+  VISIT_MEMBERS(a, drawn_j, returned_j, charge_ah, distance_m, turned_rad, duration_s);
   for (std::size_t k = 0; k < signals::term_count; ++k) visit(ledger_columns()[k], a.ledger.value[k]);
 }
 
@@ -47,21 +48,8 @@ inline constexpr int mission_identity = 4;
 template <Is<Mission> M, class Visit>
 void visit_columns(M& m, Visit&& visit) {
   visit("mission_key", m.key);
-  visit("robot_id", m.robot_id);
-  visit("mission_id", m.mission_id);
-  visit("start_utime_us", m.start_utime_us);
-  visit("end_utime_us", m.end_utime_us);
-  visit("state", m.state);
-  visit("implicit", m.implicit);
-  visit("incomplete", m.incomplete);
-  visit("incomplete_reason", m.incomplete_reason);
-  visit("payload_kg", m.payload_kg);
-  visit("note", m.note);
-  visit("model_version", m.model_version);
-  visit("samples", m.samples);
-  visit("sample_faults", m.sample_faults);
-  visit("gap_count", m.gap_count);
-  visit("gap_s", m.gap_s);
+  VISIT_MEMBERS(m, robot_id, mission_id, start_utime_us, end_utime_us, state, implicit, incomplete,
+                incomplete_reason, payload_kg, note, model_version, samples, sample_faults, gap_count, gap_s);
   visit("findings_json", m.findings_json, NullIfEmpty());
   visit("covariates_json", m.covariates);
   visit_columns(m.accounts, visit);
@@ -81,83 +69,49 @@ void visit_columns(B& b, Visit&& visit) {
   visit("speed_min_m_s", b.speed_m_s.min);
   visit("speed_mean_m_s", b.speed_m_s.mean);
   visit("speed_max_m_s", b.speed_m_s.max);
-  visit("state_of_charge", b.state_of_charge);
-  visit("measured_j", b.measured_j);
-  visit("modelled_j", b.modelled_j);
-  visit("x_m", b.x_m);
-  visit("y_m", b.y_m);
+  VISIT_MEMBERS(b, state_of_charge, measured_j, modelled_j, x_m, y_m);
 }
 
 template <Is<RobotRecord> R, class Visit>
 void visit_columns(R& r, Visit&& visit) {
-  visit("robot_id", r.robot_id);
-  visit("created_utime_us", r.created_utime_us);
-  visit("active_version", r.active_version);
+  VISIT_MEMBERS(r, robot_id, created_utime_us, active_version);
 }
 
 // All but `active`, which is a column of the robot.
 template <Is<ModelVersion> M, class Visit>
 void visit_columns(M& m, Visit&& visit) {
-  visit("robot_id", m.robot_id);
-  visit("version", m.version);
-  visit("created_utime_us", m.created_utime_us);
-  visit("origin", m.origin);
-  visit("note", m.note);
-  visit("parent_version", m.parent_version);
-  visit("model_json", m.model_json);
+  VISIT_MEMBERS(m, robot_id, version, created_utime_us, origin, note, parent_version, model_json);
   visit("evidence_json", m.evidence_json, NullIfEmpty());
 }
 
 template <Is<ResumeState> S, class Visit>
 void visit_columns(S& s, Visit&& visit) {
-  visit("robot_id", s.robot_id);
-  visit("utime_us", s.utime_us);
-  visit("sequence", s.sequence);
-  visit("state_of_charge", s.state_of_charge);
+  VISIT_MEMBERS(s, robot_id, utime_us, sequence, state_of_charge);
   visit("winding_temperature_right_c", s.winding_temperature_c[0]);
   visit("winding_temperature_left_c", s.winding_temperature_c[1]);
 }
 
 template <Is<Learned> L, class Visit>
 void visit_columns(L& l, Visit&& visit) {
-  visit("robot_id", l.robot_id);
-  visit("topic", l.topic);
-  visit("utime_us", l.utime_us);
-  visit("body_json", l.body_json);
+  VISIT_MEMBERS(l, robot_id, topic, utime_us, body_json);
 }
 
 template <Is<AuditEntry> E, class Visit>
 void visit_columns(E& e, Visit&& visit) {
   visit("audit_id", e.id);
-  visit("utime_us", e.utime_us);
-  visit("actor", e.actor);
-  visit("address", e.address);
-  visit("request_id", e.request_id);
-  visit("action", e.action);
-  visit("detail_json", e.detail_json);
-  visit("hash", e.hash);
+  VISIT_MEMBERS(e, utime_us, actor, address, request_id, action, detail_json, hash);
 }
 
 template <Is<RequestAnswer> A, class Visit>
 void visit_columns(A& a, Visit&& visit) {
   visit("actor", a.actor);
   visit("idempotency_key", a.key);
-  visit("fingerprint", a.fingerprint);
-  visit("utime_us", a.utime_us);
-  visit("status", a.status);
-  visit("location", a.location);
-  visit("body", a.body);
+  VISIT_MEMBERS(a, fingerprint, utime_us, status, location, body);
 }
 
 template <Is<FloorPlan> P, class Visit>
 void visit_columns(P& p, Visit&& visit) {
-  visit("map", p.map);
-  visit("level", p.level);
-  visit("utime_us", p.utime_us);
-  visit("resolution_m", p.resolution_m);
-  visit("origin_x_m", p.origin_x_m);
-  visit("origin_y_m", p.origin_y_m);
-  visit("origin_yaw_rad", p.origin_yaw_rad);
+  VISIT_MEMBERS(p, map, level, utime_us, resolution_m, origin_x_m, origin_y_m, origin_yaw_rad);
   visit("chargers_json", p.chargers);
   visit("media_type", p.media_type);
   visit("image", p.image, AsBytes());
@@ -177,16 +131,8 @@ inline constexpr int diagnosis_identity = 5;
 template <Is<DiagnosisRecord> D, class Visit>
 void visit_columns(D& d, Visit&& visit) {
   visit("diagnosis_id", d.id);
-  visit("robot_id", d.robot_id);
-  visit("created_utime_us", d.created_utime_us);
-  visit("cause", d.cause);
-  visit("request_json", d.request_json);
-  visit("started_utime_us", d.started_utime_us);
-  visit("finished_utime_us", d.finished_utime_us);
-  visit("state", d.state);
-  visit("model_version", d.model_version);
-  visit("fitted_on", d.fitted_on);
-  visit("held_back", d.held_back);
+  VISIT_MEMBERS(d, robot_id, created_utime_us, cause, request_json, started_utime_us, finished_utime_us,
+                state, model_version, fitted_on, held_back);
   visit("summary_json", d.summary_json, NullIfEmpty());
   visit("result_json", d.result_json, NullIfEmpty());
   visit("model_json", d.model_json, NullIfEmpty());
@@ -196,16 +142,11 @@ void visit_columns(D& d, Visit&& visit) {
 template <Is<Proposal> P, class Visit>
 void visit_columns(P& p, Visit&& visit) {
   visit("proposal_id", p.id);
-  visit("robot_id", p.robot_id);
-  visit("created_utime_us", p.created_utime_us);
-  visit("kind", p.kind);
-  visit("state", p.state);
-  visit("note", p.note);
-  visit("base_version", p.base_version);
-  visit("adopted_version", p.adopted_version);
-  visit("fitted_on", p.fitted_on);
-  visit("model_json", p.model_json);
-  visit("detail_json", p.detail_json);
+  VISIT_MEMBERS(p, robot_id, created_utime_us, kind, state, note, base_version, adopted_version, fitted_on,
+                model_json, detail_json);
 }
+
+#undef VISIT_MEMBERS
+#undef VISIT_MEMBER
 
 }  // namespace joulecast::history

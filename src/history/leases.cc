@@ -1,9 +1,7 @@
 #include "history/leases.h"
 
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string_view>
-#include <utility>
 
 #include "history/postgres.h"
 #include "history/sql_rows.h"

@@ -10,7 +10,6 @@
 #include "history/postgres.h"
 #include "history/schema.h"
 #include "history/sql_store.h"
-#include "history/sqlite.h"
 
 namespace joulecast::history {
 namespace {
@@ -20,7 +19,7 @@ constexpr std::string_view sqlite_scheme = "sqlite:";
 constexpr std::int64_t offline_busy_timeout_ms = 10'000;
 
 Result<std::unique_ptr<SqliteDatabase>> connect_file(const std::string& path, OpenMode mode) {
-  if (!std::filesystem::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
+  if (!std::filesystem::is_regular_file(path)) return fail(Fault::not_found, path, "does not exist");
   auto open = [&]() -> Result<std::unique_ptr<SqliteDatabase>> {
     auto database = std::make_unique<SqliteDatabase>(path, mode, offline_busy_timeout_ms);
     if (database->integer("PRAGMA application_id") != store_application_id)

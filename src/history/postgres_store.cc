@@ -39,8 +39,7 @@ Result<void> wait_for_lock(Database& database, bool (*try_it)(Database&),
   const auto give_up = std::chrono::steady_clock::now() + patience;
   while (!try_it(database)) {
     if (std::chrono::steady_clock::now() >= give_up)
-      return fail(Fault::conflict, "database",
-                  "is locked: another joulecast program, a daemon perhaps, has this store open");
+      return fail(Fault::conflict, "database", "is locked: another joulecast program has this store open");
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   return {};

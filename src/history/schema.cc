@@ -5,9 +5,6 @@
 #include <boost/algorithm/string/replace.hpp>
 #include <map>
 #include <sstream>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "base/host_clock.h"
 #include "base/json_writer.h"

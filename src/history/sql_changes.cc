@@ -4,8 +4,6 @@
 #include <array>
 #include <nlohmann/json.hpp>
 #include <ranges>
-#include <set>
-#include <string>
 #include <string_view>
 #include <utility>
 

@@ -1,7 +1,6 @@
 #include "history/sql_chunks.h"
 
 #include <algorithm>
-#include <string>
 #include <utility>
 #include <vector>
 

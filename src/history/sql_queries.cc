@@ -41,7 +41,7 @@ bool has_mission(Database& database, MissionKey key) {
 }
 
 tl::unexpected<Error> no_mission(MissionKey key) {
-  return fail(Fault::not_found, "id", "no mission has key " + std::to_string(key));
+  return fail(Fault::not_found, "id", "no mission has number " + std::to_string(key));
 }
 
 Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest) {

@@ -181,7 +181,7 @@ std::string holder_of(int descriptor) {
   int process = 0;
   if (const auto size = pread(descriptor, text.data(), text.size(), 0); size > 0)
     std::from_chars(text.data(), text.data() + size, process);
-  return process > 0 ? ", process " + std::to_string(process) : "";
+  return process > 0 ? " (process " + std::to_string(process) + ")" : "";
 }
 
 }  // namespace
@@ -197,9 +197,8 @@ Result<std::unique_ptr<FileLock>> FileLock::acquire(const std::string& path, boo
   auto lock = std::make_unique<FileLock>(descriptor);
   if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     const std::string holder = names_holder ? holder_of(descriptor) : "";
-    return fail(
-        Fault::conflict, "database",
-        path + " is locked: another joulecast program" + holder + ", a daemon perhaps, has this store open");
+    return fail(Fault::conflict, "database",
+                path + " is locked: another joulecast program" + holder + " has this store open");
   }
   if (names_holder && ftruncate(descriptor, 0) == 0) {
     const std::string own = std::to_string(getpid());

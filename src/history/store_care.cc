@@ -38,7 +38,7 @@ std::string quoted(const std::string& text) {
 }
 
 Result<OutputFile> new_file(const std::string& path) {
-  if (!may_write(path, path, Existing::refuse)) return fail(Fault::conflict, path, "is there already");
+  if (!may_write(path, path, Existing::refuse)) return fail(Fault::conflict, path, "already exists");
   return OutputFile::create(path, Existing::refuse);
 }
 

@@ -180,7 +180,7 @@ void Forecasts::borrow(Entry& entry) {
   for (std::size_t k = 0; k < subject_count; ++k) {
     std::vector<const forecast::OwnFinding*> others;
     for (const auto& lender : lenders) others.push_back(&(*lender)[k]);
-    siblings[k] = forecast::pool(others);
+    siblings[k] = forecast::pool(static_cast<forecast::Subject>(k), others);
   }
   entry.forecast->set_siblings(std::move(siblings));
   entry.outlook.forecaster = entry.forecast->forecaster();

@@ -22,7 +22,7 @@ struct IngestOptions {
   std::string lcm_url;
   telemetry::ListenOptions listen;
   std::size_t queue_messages = 200'000;          // bound between receiving and accounting
-  std::chrono::milliseconds publish_period{50};  // snapshots are no older than this
+  std::chrono::milliseconds publish_period{50};  // of accounting; snapshots are no older than this
   std::chrono::milliseconds energy_state_period{1000};
   SignatureOptions signatures;
   SessionSettings session;
@@ -38,8 +38,8 @@ struct IngestStatus {
   std::string key_error;  // why the robots' keys are not those of the file; empty: they are
 };
 
-// The two ingest threads: one receives from LCM, guards, decodes and queues; the other runs the pipeline,
-// ticks it, and publishes each live robot's ENERGY_STATE.
+// The two ingest threads: one receives from LCM, guards, decodes and queues; the other runs the pipeline over
+// the queue once every publish period, ticks it, and publishes each live robot's ENERGY_STATE.
 class IngestService {
  public:
   // `keeping`: as Pipeline's.
@@ -80,7 +80,7 @@ class IngestService {
   std::uint64_t unreported_ = 0;       // messages left out
   Clock::time_point next_report_{};
   mutable std::mutex mutex_;
-  std::condition_variable ready_;
+  std::condition_variable drains_;
   std::vector<InboundMessage> queue_;
   std::string error_, key_error_;
   bool draining_ = false;

@@ -247,7 +247,7 @@ void Pipeline::count_unknown_robot(const InboundMessage& message) {
     if (told_utime_us_ == 0 || message.host_utime_us - told_utime_us_ >= tell_period_us) {
       told_utime_us_ = message.host_utime_us;
       outputs_.warn(message.robot_id,
-                    "has no robot file: its messages are only counted; add the file on the page");
+                    "has no robot file: until one is added, its telemetry is counted, not recorded");
     }
   }
   RobotSnapshot& snapshot = found->second.snapshot;

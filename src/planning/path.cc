@@ -272,33 +272,48 @@ class Builder {
     path_.runs.push_back(std::move(run));
   }
 
-  // Joins a piece to the run that is being driven, with clothoids over a jump of curvature.
+  // Adds a piece to the run that is being driven: to its last side, or as a new side after a jump of
+  // curvature.
   void append(std::vector<Knot> piece) {
-    if (open_.empty()) {
-      open_ = std::move(piece);
-      piece_start_ = 0;
+    if (sides_.empty() ||
+        std::fabs(piece.front().curvature_1_m - sides_.back().back().curvature_1_m) > 1e-9) {
+      sides_.push_back(std::move(piece));
       return;
     }
-    const double joint = open_.back().way;
-    const double before = joint - piece_start_, after = piece.back().way;
-    const double jump = piece.front().curvature_1_m - open_.back().curvature_1_m;
-    piece_start_ = joint;
-    for (Knot& k : piece) k.way += joint;
-    if (std::fabs(jump) > 1e-9) {
-      const double half = 0.5 * std::min({options_.transition_m, 0.5 * before, 0.5 * after});
-      Knot middle = piece.front();
-      cut(open_, joint - half, true);
-      cut(piece, joint + half, false);
-      // Two clothoids between the remaining sides, which turn as far as the removed parts.
-      const Knot &a = open_.back(), &b = piece.front();
-      middle.curvature_1_m =
-          (b.pose.heading_rad - a.pose.heading_rad) / half - 0.5 * (a.curvature_1_m + b.curvature_1_m);
-      middle.pose.heading_rad = a.pose.heading_rad + 0.5 * half * (a.curvature_1_m + middle.curvature_1_m);
-      open_.push_back(middle);
-    } else {
-      piece.erase(piece.begin());
+    extend(sides_.back(), {piece.begin() + 1, piece.end()}, sides_.back().back().way);
+  }
+
+  static void extend(std::vector<Knot>& knots, std::vector<Knot> piece, double way) {
+    for (Knot& k : piece) k.way += way;
+    knots.insert(knots.end(), piece.begin(), piece.end());
+  }
+
+  // The run of all sides, with two clothoids over each jump of curvature, which turn as far as the removed
+  // parts.
+  std::vector<Knot> joined_sides() {
+    std::vector<Knot> knots;
+    double start = 0;
+    for (std::size_t k = 0; k < sides_.size(); ++k) {
+      std::vector<Knot>& side = sides_[k];
+      const double length = side.back().way;
+      if (k + 1 < sides_.size()) {
+        std::vector<Knot>& next = sides_[k + 1];
+        const double half = 0.5 * std::min({options_.transition_m, 0.5 * length, 0.5 * next.back().way});
+        Knot middle = next.front();
+        cut(side, length - half, true);
+        cut(next, half, false);
+        const Knot &a = side.back(), &b = next.front();
+        middle.way = length;
+        middle.curvature_1_m =
+            (b.pose.heading_rad - a.pose.heading_rad) / half - 0.5 * (a.curvature_1_m + b.curvature_1_m);
+        middle.pose.heading_rad = a.pose.heading_rad + 0.5 * half * (a.curvature_1_m + middle.curvature_1_m);
+        side.push_back(middle);
+      }
+      extend(knots, std::move(side), start);
+      start += length;
     }
-    open_.insert(open_.end(), piece.begin(), piece.end());
+    sides_.clear();
+    return knots;
   }
 
   // Ends (`keep_front`) or begins the knots at `way`.
@@ -318,9 +333,9 @@ class Builder {
   }
 
   void close() {
-    if (open_.empty()) return;
+    if (sides_.empty()) return;
     Run run;
-    run.knots = std::exchange(open_, {});
+    run.knots = joined_sides();
     run.payload_kg = payload_;
     run.dwell_before_s = std::exchange(dwell_, 0);
     path_.runs.push_back(std::move(run));
@@ -331,8 +346,7 @@ class Builder {
   Pose pose_;
   double payload_;
   double dwell_ = 0;
-  std::vector<Knot> open_;
-  double piece_start_ = 0;
+  std::vector<std::vector<Knot>> sides_;  // of the run that is being driven, each without a jump of curvature
   std::size_t knots_ = 0;
 };
 

@@ -103,8 +103,8 @@ struct PathOptions {
   double payload_kg = 0;
   double resolution_m = 0.01;  // spacing of knots on curves of varying curvature
   // A jump of curvature cannot be driven at speed. It is replaced by two clothoids with this length together,
-  // or with half the length of the shorter neighbour, which turn as far as the replaced pieces; the way
-  // deviates by at most jump * length^2 / 24.
+  // or with half the length of the shorter side of the jump, which turn as far as the replaced pieces; the
+  // way deviates by at most jump * length^2 / 24.
   double transition_m = 0.2;
 };
 

@@ -20,7 +20,7 @@ namespace {
 // `least_s` is rounded up, so that a plan for it exists.
 tl::unexpected<Error> too_soon(double deadline_s, double least_s) {
   return fail(Fault::infeasible, "deadline_s",
-              fmt::format("is {} s, the limits allow no less than {:.6f} s", deadline_s,
+              fmt::format("is {} s, must be at least {:.6f} s within the robot's limits", deadline_s,
                           std::ceil(least_s * 1e6) / 1e6));
 }
 

@@ -27,6 +27,7 @@ constexpr double lost_tolerance = 8e-5;
 // size of cells.
 constexpr int most_rounds = 3;
 constexpr std::size_t most_growth = 16, most_uniform_growth = 64;
+constexpr double at_limit = 1 - 1e-6;
 constexpr double near_limits = 0.01;  // of motors, in the middle of a cell whose knots are looked at
 constexpr double at_knots = std::numeric_limits<double>::infinity();  // parts of a cell: one for each knot
 
@@ -42,6 +43,41 @@ std::vector<double> lost_at_corners_s(const SpeedGrid& grid, const std::vector<d
   for (std::size_t k = 1; k + 1 < grid.cells(); ++k) {
     const double h = grid.step[k], higher = std::max(0.0, slope(k - 1) - slope(k + 1)) * h / 4;
     lost[k] = 0.5 * higher * h / (2 * std::pow(mean_speed(z[k], z[k + 1]), 3));
+  }
+  return lost;
+}
+
+// Time that the fastest profile loses in each cell since motors are used fully at one of its ends only [s]:
+// half of the difference, at the time that a change of the limit is worth there. It changes the far node's z
+// and those that follow: onwards where limits hold the acceleration, backwards where they hold the braking.
+std::vector<double> lost_at_ends_s(const SpeedGrid& grid, const std::vector<double>& z,
+                                   const std::vector<MotorUse>& uses) {
+  const std::size_t n = grid.cells();
+  std::vector<double> worth_s(n + 1, 0), lost(n, 0);  // of a node's z
+  for (std::size_t k = 0; k < n; ++k) {
+    const double v0 = std::sqrt(z[k]), v1 = std::sqrt(z[k + 1]),
+                 each = grid.step[k] / ((v0 + v1) * (v0 + v1));
+    if (k > 0) worth_s[k] += each / v0;
+    if (k + 1 < n) worth_s[k + 1] += each / v1;
+  }
+  for (const bool braking : {false, true}) {
+    std::vector<double> worth = worth_s;
+    const auto share = [&](const MotorUse& use) { return braking ? use.slowing : use.rising; };
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t k = braking ? i : n - 1 - i, far = braking ? k : k + 1, near = braking ? k + 1 : k;
+      const double little = 1e-6 * std::max(z[k], z[k + 1]), here = share(uses[k]);
+      if (here < at_limit) {
+        if (z[far] - z[near] > at_limit * 2 * grid.step[k] * grid.acceleration_limit)
+          worth[near] += worth[far];
+        continue;
+      }
+      const double by_0 = share(motor_use(grid, k, z[k] + little, z[k + 1])) - here,
+                   by_1 = share(motor_use(grid, k, z[k], z[k + 1] + little)) - here,
+                   by_far = braking ? by_0 : by_1, by_near = braking ? by_1 : by_0;
+      if (!(by_far > 0)) continue;
+      lost[k] = uses[k].uneven * little / by_far * worth[far];
+      worth[near] += std::max(0.0, -by_near / by_far) * worth[far];
+    }
   }
   return lost;
 }
@@ -522,58 +558,46 @@ double RunPlanner::shortest_s() {
   return shortest_s_;
 }
 
-// Where motors' limits can bind, the profile of the envelope is drivable but not always the fastest: the
-// solver computes one at a price of time that makes energy unimportant, on cells that are divided until their
-// ends cost a small share of the time. The nodes do not depend on earlier solutions, so the shortest time is
-// a constant of the run.
+// The profile of the envelope, on cells that are divided until what they lose is a small share of the time.
+// The nodes do not depend on solutions, so the shortest time is a constant of the run.
 const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
   if (fastest_) return *fastest_;
-  constexpr double unimportant = 1e5;  // times the mean power
-  const bool rough = !rough_solver_;
-  FastMotion fastest{rough ? nodes_ : rough_nodes_, {}};
-  auto solver = std::make_unique<SpeedSolver>(rough ? *solver_ : *rough_solver_);
-  std::vector<double> nodes = fastest.nodes, start;
-  fastest.solution.z = solver->envelope().fastest,
-  fastest.solution.duration_s = solver->envelope().shortest_s;
-  bool motors_bind = false;
-  for (int round = 0; round <= most_rounds && (motors_bind || solver->envelope().feasible); ++round) {
-    const SpeedGrid& grid = solver->grid();
-    if (motors_bind) {
-      solver->start_from(start);
-    } else {
-      start = solver->envelope().fastest;
-      motors_bind = duration_of(grid, start) >
-                    duration_of(grid, fastest_within(grid, grid.ceiling, grid.acceleration_limit)) *
-                        (1 + coarse_tolerance);
-    }
+  FastMotion fastest;
+  std::vector<double> nodes = rough_solver_ ? rough_nodes_ : nodes_;
+  SpeedSolver& first = rough_solver_ ? *rough_solver_ : *solver_;
+  SpeedGrid grid = first.grid();
+  SpeedEnvelope e = first.envelope();
+  for (int round = 0; round == 0 || (round <= most_rounds && e.feasible); ++round) {
     SpeedSolution s;
-    s.z = start, s.duration_s = duration_of(grid, start);
-    std::vector<double> lost_s(grid.cells(), 0);
-    if (motors_bind) {
-      const double mean_w = sum_of(solver->costs_j(start, 0)) / s.duration_s,
-                   price_w = unimportant * std::max(std::fabs(mean_w), 1e-3);
-      s = solver->solve(price_w, coarse_tolerance);
-      if (!s.converged) break;
-      for (std::size_t k = 0; k < s.ends_j.size(); ++k) lost_s[k] += s.ends_j[k] / price_w;
-    } else {
-      // The first and the last cell could hold the faster of their ends' speeds but for the acceleration.
-      for (const std::size_t k : {std::size_t{0}, grid.cells() - 1}) {
-        const double faster = std::sqrt(std::max(s.z[k], s.z[k + 1])), mean = mean_speed(s.z[k], s.z[k + 1]),
-                     ramp_s = 2 * (faster - mean) / grid.acceleration_limit;
-        lost_s[k] = (1 / mean - 1 / faster) * std::max(0.0, grid.step[k] - ramp_s * mean);
-      }
+    s.z = e.fastest, s.duration_s = e.shortest_s;
+    const auto binds = [&](Bound bound, double share) {
+      s.binding[static_cast<std::size_t>(bound)] |= share > at_limit;
+    };
+    std::vector<MotorUse> uses;
+    for (std::size_t k = 0; k < grid.cells(); ++k) {
+      const MotorUse& use = uses.emplace_back(motor_use(grid, k, s.z[k], s.z[k + 1]));
+      if (k > 0) binds(Bound::speed, s.z[k] / grid.ceiling[k]);
+      binds(Bound::acceleration,
+            std::fabs(s.z[k + 1] - s.z[k]) / (2 * grid.step[k] * grid.acceleration_limit));
+      binds(Bound::current, use.current), binds(Bound::voltage, use.voltage);
+    }
+    std::vector<double> lost_s = lost_at_ends_s(grid, s.z, uses);
+    // The first and the last cell could hold the faster of their ends' speeds but for the acceleration.
+    for (const std::size_t k : {std::size_t{0}, grid.cells() - 1}) {
+      if (lost_s[k] > 0) continue;
+      const double faster = std::sqrt(std::max(s.z[k], s.z[k + 1])), mean = mean_speed(s.z[k], s.z[k + 1]),
+                   ramp_s = 2 * (faster - mean) / grid.acceleration_limit;
+      lost_s[k] = (1 / mean - 1 / faster) * std::max(0.0, grid.step[k] - ramp_s * mean);
     }
     const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
     for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
     const double most_s = lost_tolerance * s.duration_s;
     const std::vector<double> parts = least_parts(grid, nodes, s.z, round == 0 ? 2 : 1);
-    fastest.nodes = nodes, fastest.solution = std::move(s);
+    fastest = {std::move(nodes), std::move(s)};
     if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
     nodes = split(fastest.nodes, lost_s, 0.8 * most_s, parts);
-    start = resampled(fastest.nodes, fastest.solution.z, nodes);
-    solver = std::make_unique<SpeedSolver>(grid_over(nodes));
+    grid = grid_over(nodes), e = speed_envelope(grid);
   }
-  fastest.solution.price_w = 0, fastest.solution.cost_j = sum_of(driven_j(fastest.nodes, fastest.solution.z));
   return fastest_.emplace(std::move(fastest));
 }
 
@@ -887,6 +911,8 @@ Result<RunAnswer> RunPlanner::fastest() {
   if (!solver_) TRY(build_grid());
   const FastMotion& fast = fastest_motion();
   RunAnswer answer = answer_of(fast.solution, fast.nodes);
+  answer.energy_j = sum_of(driven_j(fast.nodes, fast.solution.z));
+  answer.convex = !loads_->scrubs() && loads_->electric().down >= 0;
   answer.discretisation_j = 0;  // that of the last solution, at another price
   return answer;
 }

@@ -2,17 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dynamics/stribeck_curve.h"
-#include "planning/root.h"
 
 namespace joulecast::planning {
 namespace {
 
-constexpr double just_below = 1e-9;  // a limit: relative, of the squared speed
+constexpr double just_below = 1e-9;  // a limit, relative
 
 // Torque of a wheel without smoothing.
 double torque_of(const WheelLoad& w, double v, double q) {
+  if (w.quadratic()) return w.inertia * q + w.t0 + w.f0 + v * (w.t1 + w.f1 + v * (w.t2 + w.f2));
   const double direction = w.direction(v);
   double through = w.inertia * q + w.t0 + direction * w.t_dry + v * (w.t1 + v * w.t2);
   if (w.scrub != 0) through += w.scrub * std::tanh(v / w.scrub_speed);
@@ -31,15 +32,25 @@ MotorUse motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, dou
     const auto reach = [&](double t) {
       const double volts =
           e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
-      for (const double share : {t / grid.torque_limit_nm, volts / grid.voltage_limit_v}) {
+      const auto reaches = [&](double share, double& of_limit) {
         double& most = share * w.inertia < 0 ? use.slowing : use.rising;
-        most = std::max(most, std::fabs(share));
-      }
+        most = std::max(most, std::fabs(share)), of_limit = std::max(of_limit, std::fabs(share));
+      };
+      reaches(t / grid.torque_limit_nm, use.current), reaches(volts / grid.voltage_limit_v, use.voltage);
     };
     reach(torque_of(w, v, q));
     if (w.creep != 0) reach(torque_of(w.rolling(), v, q));
   }
   return use;
+}
+
+MotorUse motor_use(const SpeedGrid& grid, std::size_t cell, double z0, double z1) {
+  const double q = (z1 - z0) / (2 * grid.step[cell]);
+  const MotorUse first = motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q),
+                 last = motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q);
+  return {std::max(first.rising, last.rising), std::max(first.slowing, last.slowing),
+          std::max(first.current, last.current), std::max(first.voltage, last.voltage),
+          0.5 * std::fabs(first.most() - last.most())};
 }
 
 Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share) {
@@ -115,35 +126,48 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.front() = grid.start;
   e.fastest.back() = grid.end;
 
-  // Within a cell, motor use lies between its values at the two ends.
-  const auto use = [&](std::size_t cell, double z0, double z1) {
-    const double q = (z1 - z0) / (2 * grid.step[cell]);
-    const MotorUse first = motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q),
-                   last = motor_use(grid, grid.load(cell, 1), std::sqrt(z1), q);
-    return MotorUse{std::max(first.rising, last.rising), std::max(first.slowing, last.slowing)};
-  };
   const auto most_change = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
-  const auto highest = [](auto&& excess, double low, double high) {
-    const double at_high = excess(high);
-    if (!(at_high > 0)) return high;
-    const double at_low = excess(low);
-    return at_low < 0 ? (1 - just_below) * zero_between(excess, low, at_low, high, at_high) : low;
+  // The greatest z between `low` and `high` that keeps the limits, by regula falsi (Illinois) from `same`,
+  // the z of the cell's other end, or from `low`.
+  const auto highest = [](auto&& use_at, double low, double high, double same) {
+    const auto excess = [&](double z) { return use_at(z) - (1 - just_below); };
+    double above = excess(high), below = 0;
+    if (!(above > just_below)) return high;
+    for (const double from : {same, low}) {
+      if (from < high && (below = excess(from)) < 0) {
+        low = from;
+        break;
+      }
+    }
+    if (!(below < 0)) return low;
+    for (int last = 0, k = 0; k < 100 && high - low > just_below * low; ++k) {
+      const double z = low + (high - low) * below / (below - above), y = excess(z);
+      if (std::fabs(y) < just_below) return z;
+      double& other = y > 0 ? below : above;
+      if (const int side = y > 0 ? 1 : -1; std::exchange(last, side) == side) other *= 0.5;
+      (y > 0 ? high : low) = z, (y > 0 ? above : below) = y;
+    }
+    return low;
   };
   // The fastest at the far end of a cell that its near end and the motors allow.
   const auto fastest_after = [&](std::size_t cell, double near) {
-    return highest([&](double far) { return use(cell, near, far).rising - 1; },
+    return highest([&](double far) { return motor_use(grid, cell, near, far).rising; },
                    std::max(0.0, near - most_change(cell)),
-                   std::min(e.fastest[cell + 1], near + most_change(cell)));
+                   std::min(e.fastest[cell + 1], near + most_change(cell)), near);
   };
   // From which speeds a cell can be left within its bound, which may take slowing down. Then those from which
   // the start leads on as fast as possible (Pham & Pham, IEEE Trans. Robot. 34 (2018), sec. III).
   for (std::size_t k = n; k-- > 0;) {
-    const auto excess = [&](double near) {
-      const MotorUse top = use(k, near, e.fastest[k + 1]);
-      const bool sure = top.slowing > 1 || top.rising <= 1;
-      return sure ? top.slowing - 1 : use(k, near, fastest_after(k, near)).most() - 1;
+    const auto most = [&](double near) {
+      const MotorUse top = motor_use(grid, k, near, e.fastest[k + 1]);
+      if (top.slowing > 1 || top.rising <= 1) return top.slowing;
+      const double steady = motor_use(grid, k, near, std::min(near, e.fastest[k + 1])).most();
+      if (steady < 1) return steady;
+      const MotorUse after = motor_use(grid, k, near, fastest_after(k, near));
+      return after.rising > 1 ? after.rising : after.slowing;
     };
-    e.fastest[k] = highest(excess, 0, std::min(e.fastest[k], e.fastest[k + 1] + most_change(k)));
+    e.fastest[k] =
+        highest(most, 0, std::min(e.fastest[k], e.fastest[k + 1] + most_change(k)), e.fastest[k + 1]);
   }
   for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = fastest_after(k, e.fastest[k]);
   e.slowest = slowest_profile(grid, grid.acceleration_limit);

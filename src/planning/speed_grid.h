@@ -32,12 +32,16 @@ struct SpeedGrid {
 };
 
 // The most that a motor is used of its current and voltage limits at a speed and an acceleration: of those
-// that less acceleration relieves, and of those that more does.
+// that less acceleration relieves, and of those that more does; of each limit.
 struct MotorUse {
   double rising = 0, slowing = 0;
-  double most() const { return std::max(rising, slowing); }
+  double current = 0, voltage = 0;
+  double uneven = 0;  // half the difference between the ends of a cell
+  double most() const { return std::max(current, voltage); }
 };
 MotorUse motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q);
+// Within a cell, it lies between its values at the two ends: the greater of them.
+MotorUse motor_use(const SpeedGrid& grid, std::size_t cell, double z0, double z1);
 
 // Which limits of the motors speeds up to `v` within the acceleration limit could reach, by side and sign
 // (positive, negative); of voltage, within the limit of torque.

@@ -41,7 +41,8 @@ struct Check {
   // measurement.
   std::optional<double> factor{};
   bool swapped = false;  // the sides of the channel, or both of its channels, are exchanged
-  double probability = std::numeric_limits<double>::quiet_NaN();  // of such a sign or unit
+  // Of such a sign or unit; where the channel is not contradicted, that there is any error in its place.
+  double probability = std::numeric_limits<double>::quiet_NaN();
 };
 
 // Returns the findings, most fundamental first, about a dozen at most. Consequences of another finding are

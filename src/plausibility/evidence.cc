@@ -227,7 +227,8 @@ class Gatherer {
   // The battery's power while the robot drives, and its parts for speed and acceleration. A wrong scale of
   // the wheels' speeds acts on each by another exponent than one of the power.
   void moved_power(const Powers& power) {
-    constexpr Eigen::Index modelled = 1, one = 2, steady = 4, accelerating = 5, climbing = 6, half = 7;
+    constexpr Eigen::Index modelled = 1, one = 2, steady = 4, accelerating = 5, climbing = 6, half = 7,
+                           turning = 8;
     const std::vector<Products::Block> blocks = c_.blocks(Relation::driving);
     if (blocks.empty()) return;
     Products::Block all = blocks.front();
@@ -248,10 +249,10 @@ class Gatherer {
              all.sums(one, modelled) - all.sums(one, steady) - all.sums(one, accelerating) + steady_at_half +
                  accelerating_at_half,
              modelled, {.property = P::driving_power});
-    const BlockFit fit = fit_blocks(blocks, 0, {one, steady, accelerating, climbing});
+    const BlockFit fit = fit_blocks(blocks, 0, {one, steady, accelerating, climbing, turning});
     if (!fit.known()) return;
-    Eigen::VectorXd rest = Eigen::VectorXd::Unit(half + 1, 0);
-    rest({one, steady, accelerating, climbing}) = -fit.coefficient;
+    Eigen::VectorXd rest = Eigen::VectorXd::Unit(turning + 1, 0);
+    rest({one, steady, accelerating, climbing, turning}) = -fit.coefficient;
     const double left = std::sqrt(std::max(rest.dot(all.sums * rest), 0.0));
     const auto part = [&](const char* says, Eigen::Index k, double scale, double at_half, Property property) {
       const Estimate ratio = estimate(fit, k == steady ? 1 : 2);

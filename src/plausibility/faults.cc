@@ -11,11 +11,10 @@ namespace {
 
 using namespace reading;
 
-constexpr double lost_surprise = 1;   // of evidence that a fault would make meaningless
-constexpr double least_support = 1;   // nats by which the support for a fault must exceed its surprise
-constexpr double least_gain = 4;      // nats, beyond the fault's own surprise
-constexpr double nearly = 1.5;        // nats between explanations that are about equally good
-constexpr double least_factor = 2.0;  // of a unit
+constexpr double slight = 1;  // nats: least surprise of meaningless evidence, least of a fault's support
+constexpr double least_told = 0.2, certain = 0.982;  // probability of an error: told; its channel is not used
+constexpr double nearly = 1.5;                       // nats between explanations that are about equally good
+constexpr double least_factor = 2.0;                 // of a unit
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
 constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // per m/s
 
@@ -84,7 +83,8 @@ double core_of(Property property) {
 double surprise_of(const ChannelEvidence& e, const Combined& faults) {
   if (e.trust == 0) return 0;
   const auto expected = predicted(e, faults);
-  if (!expected) return std::min(lost_surprise, e.trust);
+  // A fault gains nothing by making evidence meaningless.
+  if (!expected) return std::max(std::min(slight, e.trust), surprise_of(e, Combined({})));
   const double ratio = e.ratio.value / *expected;
   if (ratio < 0) return e.trust;
   const double log_sd = std::hypot(e.ratio.sd / e.ratio.value, e.unexplained);
@@ -123,16 +123,12 @@ Set set_without(const Set& set, const ChannelFault* fault) {
   return rest;
 }
 
-// True if each fault predicts the observations, and does not only make contradicting evidence meaningless.
-bool supported(std::span<const ChannelEvidence> evidence, const Set& set) {
-  const Combined all(set);
-  return std::ranges::all_of(set, [&](const ChannelFault* fault) {
-    const Combined others(set_without(set, fault));
-    double support = 0;
-    for (const ChannelEvidence& e : evidence) {
-      if (predicted(e, all)) support += surprise_of(e, others) - surprise_of(e, all);
-    }
-    return support >= fault->surprise + least_support;
+// True if the fault changes what some evidence is expected to be: else these data say nothing about it.
+bool is_tested(std::span<const ChannelEvidence> evidence, const ChannelFault& fault) {
+  const Combined with({&fault});
+  return std::ranges::any_of(evidence, [&](const ChannelEvidence& e) {
+    const auto expected = predicted(e, with);
+    return e.trust > 0 && expected && *expected != 1;
   });
 }
 
@@ -194,11 +190,11 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
        {"computed from m/s as if they were km/h", 1 / km_h, odd_nats},
        {"computed from miles an hour as if they were m/s", mph, odd_nats},
        {"computed from feet a second as if they were m/s", feet, odd_nats},
-       {"2 times the motion, counted twice", 2, unit_nats},
-       {"4 times the motion, counted four times", 4, odd_nats},
-       {"0.5 times the motion, counted half", 0.5, odd_nats},
-       {"0.25 times the motion, counted a quarter", 0.25, odd_nats},
-       {"6.28 times the motion, multiplied by 2 pi", 2 * std::numbers::pi, odd_nats}});
+       {"counted twice (2 times the motion)", 2, unit_nats},
+       {"counted four times (4 times the motion)", 4, odd_nats},
+       {"counted half (0.5 times the motion)", 0.5, odd_nats},
+       {"counted a quarter (0.25 times the motion)", 0.25, odd_nats},
+       {"multiplied by 2 pi once too often", 2 * std::numbers::pi, odd_nats}});
   for (std::size_t k : {0u, 1u})
     add("wheel_velocity", std::string("wheel_velocity.") + side_name[k], {wheel_velocity + k},
         {{reversed, -1, sign_nats}});
@@ -274,44 +270,46 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
 FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
                                 std::span<const ChannelFault> faults) {
   FaultExplanation best;
-  Set set;
-  const double none = surprise_of(evidence, Combined(set));
-  double least = none;
-  if (none < least_gain) return best;
+  Set tested, set;
+  for (const ChannelFault& fault : faults)
+    if (is_tested(evidence, fault)) tested.push_back(&fault);
+  const double none = surprise_of(evidence, Combined({}));
+  double least = std::numeric_limits<double>::infinity();
   const auto try_set = [&](const Set& candidate) {
-    const double s = surprise_of(evidence, Combined(candidate), least);
-    if (!(s < least - 1e-9) || !supported(evidence, candidate)) return;
+    const double most = candidate.size() > 1 ? std::min(least, none) : least;
+    const double s = surprise_of(evidence, Combined(candidate), most);
+    if (!(s < most - 1e-9)) return;
     least = s;
     set = candidate;
   };
-  for (const ChannelFault& one : faults) {
-    try_set({&one});
-    for (const ChannelFault& two : faults) {
-      if (&two > &one) try_set({&one, &two});
-    }
-  }
+  for (const ChannelFault* one : tested) try_set({one});
+  for (std::size_t one = 0; one < tested.size(); ++one)
+    for (std::size_t two = one + 1; two < tested.size(); ++two) try_set({tested[one], tested[two]});
   if (set.size() == 2) {
     const Set pair = set;
-    for (const ChannelFault& third : faults) try_set({pair[0], pair[1], &third});
+    for (const ChannelFault* third : tested) try_set({pair[0], pair[1], third});
   }
-  if (set.empty() || none - least < least_gain * static_cast<double>(set.size())) return best;
-  best.gain = none - least;
-  best.faults = set;
   for (std::size_t k = 0; k < set.size(); ++k) {
-    auto& others = best.alternatives.emplace_back();
+    std::vector<const ChannelFault*> others;
+    double absent = std::exp(least - surprise_of(evidence, Combined(set_without(set, set[k]))));
+    if (set.size() > 1) absent += std::exp(least - none);
     // Of the fault or one that is nearly the same, and of all.
-    double weight = 1, all = 1 + std::exp(least - surprise_of(evidence, Combined(set_without(set, set[k]))));
+    double same = 1, all = 1 + absent;
     Set with = set;
-    for (const ChannelFault& fault : faults) {
-      with[k] = &fault;
-      if (std::ranges::count(set, &fault) > 0 || !supported(evidence, with)) continue;
+    for (const ChannelFault* fault : tested) {
+      with[k] = fault;
+      if (std::ranges::count(set, fault) > 0) continue;
       const double more = surprise_of(evidence, Combined(with)) - least;
       all += std::exp(-more);
-      if (fault.id == set[k]->id && std::fabs(std::log(factor_of(fault) / factor_of(*set[k]))) < same_ratio)
-        weight += std::exp(-more);
-      if (more <= nearly) others.push_back(&fault);
+      if (fault->id == set[k]->id && std::fabs(std::log(factor_of(*fault) / factor_of(*set[k]))) < same_ratio)
+        same += std::exp(-more);
+      if (more <= nearly) others.push_back(fault);
     }
-    best.probability.push_back(weight / all);
+    if (1 - absent / all < least_told) continue;
+    best.faults.push_back(set[k]);
+    best.alternatives.push_back(std::move(others));
+    best.probability.push_back(same / all);
+    best.any.push_back(1 - absent / all);
   }
   return best;
 }
@@ -330,7 +328,7 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
     double exponent = 1;
     for (const auto& [k, power] : e.powers)
       if (fault.factor[k] != 1) exponent = power;
-    if (supports >= least_support)
+    if (supports >= slight)
       by_gear = by_gear && e.by_gear, by_power = by_power && e.by_power && exponent == 1;
     if (supports <= most) continue;
     most = supports;
@@ -355,11 +353,15 @@ void check_faults(const CheckContext& c, Checks& checks) {
     const Measured measured = measured_factor(evidence, explanation, fault);
     if (measured.evidence == nullptr) continue;
     const ChannelEvidence& e = *measured.evidence;
-    Check& check =
-        checks.emplace_back(Check{fault.id, fault.channel, measured.factor, measured.interval, {}, true});
-    check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
-                             fault.cause, e.says, with_interval(e.ratio), e.against,
-                             contract_of(fault.channel), also(explanation.alternatives[k], measured));
+    const bool contradicted = explanation.any[k] >= certain;
+    Check& check = checks.emplace_back(
+        Check{fault.id, fault.channel, measured.factor, measured.interval, {}, contradicted});
+    check.says =
+        fmt::format("{} {} {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
+                    contradicted ? "looks" : "may be", fault.cause, e.says, with_interval(e.ratio), e.against,
+                    contract_of(fault.channel), also(explanation.alternatives[k], measured));
+    check.probability = explanation.any[k];
+    if (!contradicted) continue;
     // A robot file that is wrong by the factor would look the same.
     const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
     check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);

@@ -26,13 +26,14 @@ struct ChannelFault {
 std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
                                        std::span<const ChannelEvidence> evidence = {});
 
-// The combination of faults with the least surprise, given all evidence.
+// The combination of faults with the least surprise, given all evidence; those that are likely enough to be
+// told.
 struct FaultExplanation {
   std::vector<const ChannelFault*> faults;  // empty: no fault
   std::vector<std::vector<const ChannelFault*>>
-      alternatives;                 // of each fault: replacements that are about equally good
-  std::vector<double> probability;  // of each fault, against every replacement and none in its place
-  double gain = 0;                  // nats by which it is better than no fault
+      alternatives;  // of each fault: replacements that are about equally good
+  // Of each fault, against every replacement and none in its place: probability of it, and of any.
+  std::vector<double> probability, any;
 };
 
 FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,

@@ -193,7 +193,8 @@ void Observer::take_power(const Cell& c) {
   for (double& w : at.wheel_speed_rad_s) w *= 0.5;
   relate(Relation::driving, {wr, wl, vb, ib},
          {c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0), steady,
-          modelled - idle - steady, or_zero(climb), model_.flow(at).battery_power_w - idle});
+          modelled - idle - steady, or_zero(climb), model_.flow(at).battery_power_w - idle,
+          std::fabs(c.mean[wr] - c.mean[wl])});
 }
 
 void Observer::take(const Span& s) {

@@ -30,8 +30,8 @@ enum class Relation : std::size_t {
   torque_left,
   motors,        // battery power, power of both motors, 1
   driving,       // battery power, the model's, 1, battery power plus that of descents, the model's at steady
-                 // speed and for acceleration, m g v sin(pitch), the model's at half the steady speed; where
-                 // the model has no braking
+                 // speed and for acceleration, m g v sin(pitch), the model's at half that speed, turning;
+                 // where the model has no braking
   idle,          // battery power, 1; standing
   motion,        // battery power, the model's, 1
   sag,           // changes of the battery's voltage, of its current, from one cell to the next; the

@@ -91,11 +91,9 @@ void check_held(const CheckContext& c, Checks& checks) {
     longest = std::max(longest, period);
   }
   if (!channels.empty())
-    add_check(
-        checks, "held_samples", channels, {longest}, false,
-        "Rows come every {:.3g} s and repeat readings; new ones come less often: {}. Rows between contain no "
-        "new measurement.",
-        c.period_s(), says);
+    add_check(checks, "held_samples", channels, {longest}, false,
+              "Rows come every {:.3g} s and repeat readings; new readings come less often: {}.", c.period_s(),
+              says);
 }
 
 void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks& checks) {

@@ -142,10 +142,10 @@ bool check_supply(const CheckContext& c, Checks& checks) {
 
 // True if the sides or signs of the wheels are wrong: correct readings then appear unsigned.
 bool wheels_look_wrong(const CheckContext& c) {
-  const std::vector<ChannelEvidence>& evidence = evidence_of(c);
-  const std::vector<ChannelFault> faults = known_faults(c.robot);
-  return std::ranges::any_of(explain_faults(evidence, faults).faults,
-                             [](const ChannelFault* f) { return f->channel.starts_with("wheel_velocity"); });
+  Checks checks;
+  check_faults(c, checks);
+  return std::ranges::any_of(
+      checks, [](const Check& k) { return k.contradicted && k.channel.starts_with("wheel_velocity"); });
 }
 
 bool never_negative(const ValueTally& t) {

@@ -18,4 +18,7 @@ struct DrawnMotion {
 // first motion is drawn on top. There is at least one, with at least two instants.
 std::string draw_profile(std::string_view heading, std::span<const DrawnMotion> motions);
 
+// Round values that span a range.
+std::vector<double> ticks_of(double low, double high, int about);
+
 }  // namespace joulecast::report

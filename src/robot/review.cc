@@ -157,7 +157,7 @@ void Review::battery() {
     return warn("/idle_power_w", 0.0, "is 0 W, but computer, drivers and sensors always draw power");
   const double standing_h = motion_.energy_wh / model_.idle_power_w;
   if (standing_h > 1000 || standing_h < 0.5)
-    warn("/idle_power_w", standing_h, "is {:.4g} W: a full battery of {:.4g} Wh lasts {:.3g} h at rest",
+    warn("/idle_power_w", standing_h, "is {:.4g} W: a full battery of {:.4g} Wh lasts {:.1f} h at rest",
          model_.idle_power_w, motion_.energy_wh, standing_h);
 }
 

@@ -12,7 +12,6 @@
 
 #include "base/try.h"
 #include "base/utf8.h"
-#include "signals/ids.h"
 #include "telemetry/datagram.h"
 
 namespace joulecast::telemetry {

@@ -9,7 +9,6 @@
 #include <numbers>
 #include <numeric>
 #include <span>
-#include <string>
 #include <utility>
 
 #include "base/median.h"
@@ -532,8 +531,8 @@ class Importer {
                                  table_.line(), step_s < 0 ? "back" : "forward", std::abs(step_s),
                                  step_s > 0 ? ""
                                  : mapping_.layout.time_unit_ns > 0
-                                     ? R"(; "wraps_at" is for a time that wraps)"
-                                     : R"(; a zone in "utc_offset" is for clocks that are set)"));
+                                     ? R"(; set "wraps_at" for a time that overflows)"
+                                     : R"(; name the zone in "utc_offset" if its clocks change)"));
     // Rows without a date go on after the mission before.
     if (options_.start_utime_us && last_us > 0 && step_s < 0)
       shift_us_ = last_us + options_.pause_us - row.since_zero_us;

@@ -116,7 +116,7 @@ Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {
   while (fields.size() > header_.size() && trimmed(fields.back()).empty()) fields.pop_back();
   while (fields.size() < header_.size() && trimmed(header_[fields.size()]).empty()) fields.emplace_back();
   if (fields.size() == header_.size()) return true;
-  return corrupt(line(), fmt::format("has {} fields where the header has {}", fields.size(), header_.size()));
+  return corrupt(line(), fmt::format("has {} fields, the header {}", fields.size(), header_.size()));
 }
 
 bool CsvTable::at_line_end() const noexcept {

@@ -166,7 +166,7 @@ std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
   if (!both("battery_voltage", "battery_current") && !both("motor_voltage[0]", "motor_current[0]"))
     found.push_back(
         {"/fields",
-         "give neither the battery's voltage and current nor the motors': no power will be available"});
+         "contains neither voltage and current of the battery nor those of the motors: power is unknown"});
   for (const auto& [name, expression] : given) {
     // A constant pitch is a statement: that a dynamometer is flat.
     if (expression->combine != Combine::constant || name == "pitch") continue;

@@ -170,7 +170,7 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
     if (found.size() == 1) return CellPlace{found[0]};
     if (found.size() > 1)
       return fail(Fault::invalid, here,
-                  fmt::format("columns {} and {} are called '{}': the mapping names them '{}#1' and '{}#2'",
+                  fmt::format("columns {} and {} are both called '{}': write '{}#1' or '{}#2' in the mapping",
                               found[0] + 1, found[1] + 1, tried, tried, tried));
   }
   static const RE2 numbered(R"((.+)#(\d{1,9}))"), listed(R"((.+)\[(\d{1,9})\])");
@@ -185,7 +185,7 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
   constexpr std::size_t enough = 100;  // columns
   const auto shown = std::span(header()).first(std::min(enough, header().size()));
   return fail(Fault::invalid, here,
-              fmt::format("column '{}' is missing; there are '{}'{}", column, fmt::join(shown, "', '"),
+              fmt::format("column '{}' is missing; the table has '{}'{}", column, fmt::join(shown, "', '"),
                           shown.size() < header().size() ? " and more" : ""));
 }
 
@@ -198,10 +198,10 @@ Result<bool> ImportTable::next() {
       if (error.message.starts_with("has "))
         error.message +=
             rows_ > 0
-                ? R"(: where columns came or went while it was written, split the table here; "header" names )"
-                  "the columns of the part behind"
+                ? R"(. If its columns changed during the recording, split the table here and name those of )"
+                  R"(the second part in "header")"
             : layout_.format.header.empty()
-                ? R"(: "header" names every column, with "skip_lines": 1 for the line that it replaces)"
+                ? R"(. Name every column in "header", with "skip_lines": 1 to skip the present header)"
                 : "";
       return tl::unexpected(std::move(error));
     }
@@ -315,12 +315,12 @@ std::vector<std::string> ImportTable::notes() const {
         format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
         decimal_comma_ ? ',' : '.', grouped_ ? ", the other between groups of three digits" : ""));
   if (timeless_ > 0)
-    notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,
-                                first_timeless_->field));
-  if (headers_ > 0) notes.push_back(fmt::format("the header comes {} times more", headers_));
+    notes.push_back(
+        fmt::format("rows without a time left out: {}, the first: {}", timeless_, first_timeless_->field));
+  if (headers_ > 0) notes.push_back(fmt::format("repeated headers: {}", headers_));
   if (!damaged_lines_.empty())
     notes.push_back(
-        fmt::format("{} damaged rows are left out (cut, or with zero bytes), the first at line {}",
+        fmt::format("damaged rows (truncated or with zero bytes) left out: {}, the first at line {}",
                     damaged_lines_.size(), damaged_lines_[0]));
   return notes;
 }

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <cmath>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -13,7 +12,6 @@
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
 #include "telemetry/datagram.h"
-#include "telemetry/event_log.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/validation.h"
 
@@ -141,7 +139,7 @@ Result<LogRecordings> read_recordings(std::span<const std::string> paths, const 
   for (const std::string& path : paths) {
     const std::uint64_t before = tally.events;
     TRY(read_events(path, take, tally));
-    if (tally.events == before) return invalid("log", path + " is no LCM event log, or an empty one");
+    if (tally.events == before) return invalid("log", path + " is not an LCM event log, or is empty");
   }
   if (!paths.empty()) TRY(need_robots(paths.front(), tally));
   return collector.finish(tally.damaged_places);

@@ -5,11 +5,6 @@
 
 namespace joulecast::telemetry {
 
-std::string_view name_of(MissionEnd end) noexcept {
-  constexpr std::string_view names[] = {"finished", "aborted", "superseded", "unfinished", "idle", "expired"};
-  return names[static_cast<std::size_t>(end)];
-}
-
 SampleStep MissionTracker::on_sample(std::int64_t utime_us, double payload_kg) {
   SampleStep step;
   if (current_) close_if_over(step.actions, utime_us);
@@ -165,7 +160,6 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
 
 void MissionTracker::open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
                           std::string note) {
-  ++counters_.opened_explicit;
   begin_us_ = utime_us;
   current_ = OpenMission{id, utime_us, utime_us, payload_kg, false};
   actions.push_back(

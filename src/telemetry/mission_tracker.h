@@ -33,8 +33,6 @@ enum class MissionEnd {
   expired      // an implicit mission that reached its longest duration
 };
 
-[[nodiscard]] std::string_view name_of(MissionEnd end) noexcept;
-
 struct OpenMission {
   std::string mission_id;
   std::int64_t start_utime_us = 0;
@@ -64,7 +62,6 @@ struct SampleStep {
 };
 
 struct MissionCounters {
-  std::uint64_t opened_explicit = 0;
   std::uint64_t opened_implicit = 0;
   std::uint64_t closed = 0;
   std::uint64_t duplicate_events = 0;     // of a start or an end that was received already

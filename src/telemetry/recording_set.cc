@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "telemetry/log_recordings.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -91,7 +90,7 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
     twice += put_in_order(samples);
     fastest_hz = std::max(fastest_hz, samples.size() < 2 ? 0 : rate_hz(mission));
     if (samples.size() >= 2) return false;
-    set.notes.push_back("mission " + mission.mission_id + " holds no motion and was left out");
+    set.notes.push_back("mission " + mission.mission_id + " contains no motion and was left out");
     return true;
   });
   if (without_speed > 0)
@@ -109,7 +108,7 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
     set.missions.push_back(std::move(mission));
   }
   if (!set.missions.empty()) return set;
-  const std::string none = fmt::format("holds no mission of at least {:g} s", shortest_mission_s);
+  const std::string none = fmt::format("contains no mission of at least {:g} s", shortest_mission_s);
   if (fastest_hz < greatest_rate_hz) return invalid("log", none);
   return invalid("utime", fmt::format("{}, as samples would come {:.3g} times a second: is utime given in ms "
                                       "or s? joulecast expects us since 1970",
@@ -119,11 +118,11 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
                                      const LogObserver& passed) {
   TRY_ASSIGN(LogRecordings log, read_recordings(paths, robot_id, passed));
-  if (log.robots.empty()) return invalid("log", "holds no telemetry");
+  if (log.robots.empty()) return invalid("log", "contains no telemetry");
   if (!robot_id.empty() && !log.robots.contains(robot_id))
-    return invalid("log", "holds no telemetry of " + robot_id + ", only of " + listed(log.robots));
+    return invalid("log", "contains no telemetry of " + robot_id + ", only of " + listed(log.robots));
   if (robot_id.empty() && log.robots.size() > 1) {
-    return invalid("log", fmt::format("holds {} robots, {}; name the one to diagnose", log.robots.size(),
+    return invalid("log", fmt::format("contains {} robots, {}; select one with --robot-id", log.robots.size(),
                                       listed(log.robots)));
   }
   Result<RecordingSet> set =

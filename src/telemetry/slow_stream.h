@@ -14,8 +14,8 @@ inline constexpr double slow_rate_hz = 5;
 inline std::string slow_stream(double rate_hz) {
   if (!(rate_hz < slow_rate_hz)) return "";
   return fmt::format(
-      "is a slow stream of {:.3g} Hz: currents between samples are not measured, so that copper and braking "
-      "are too small",
+      "is a slow stream of {:.3g} Hz: currents between samples are not measured, so copper and braking are "
+      "underestimated",
       rate_hz);
 }
 

@@ -104,11 +104,6 @@ std::optional<Implausible> check_plausible(const signals::Covariate& covariate) 
   return std::nullopt;
 }
 
-std::string_view name_of(Implausibility why) noexcept {
-  constexpr std::string_view names[] = {"missing", "infinite", "out_of_range", "bad_clock", "bad_sequence"};
-  return names[static_cast<std::size_t>(why)];
-}
-
 std::string describe(const Implausible& fault) {
   std::string text(fault.field);
   switch (fault.why) {

@@ -46,6 +46,4 @@ struct Implausible {
 [[nodiscard]] std::optional<Implausible> check_plausible(const signals::Covariate& covariate) noexcept;
 [[nodiscard]] std::string describe(const Implausible& fault);
 
-[[nodiscard]] std::string_view name_of(Implausibility why) noexcept;
-
 }  // namespace joulecast::telemetry

@@ -182,7 +182,7 @@ def main():
     # What does not exist is named as the command names it.
     for command, message in ((["adopt", "amr", "--proposal", "99"], "--proposal: no proposal has id 99"),
                              (["adopt", "amr", "--diagnosis", "99"], "--diagnosis: no diagnosis has id 99"),
-                             (["ledger", "99999"], "mission: no mission has key 99999")):
+                             (["ledger", "99999"], "mission: no mission has number 99999")):
         done = subprocess.run([options.client, *command, "--server", programs.url], capture_output=True, text=True)
         check(done.returncode == 1 and f"joulecast: {message} (" in done.stderr, f"{command}: {done.stderr}")
     for command in (["robots"], ["state", "amr"], ["ledger", "1"], ["autonomy", "amr"], ["gap", "amr"], ["adopt", "amr", "--version", "1"]):

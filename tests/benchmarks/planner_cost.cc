@@ -14,7 +14,6 @@
 #include <string>
 #include <vector>
 
-#include "dynamics/straight.h"
 #include "planning/baseline.h"
 #include "planning/cost_table.h"
 #include "planning/limited_line.h"
@@ -22,6 +21,7 @@
 #include "tests/benchmarks/rmf_motion.h"
 #include "tests/planning/random_problem.h"
 #include "tests/study/ramp/ramp.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::benchmarks {
 namespace {

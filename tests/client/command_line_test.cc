@@ -143,6 +143,17 @@ TEST_F(CommandLine, HelpFitsTerminalWidth) {
   });
 }
 
+TEST_F(CommandLine, HelpOmitsHiddenParts) {
+  each_command(program_, [](const CLI::App& app, const std::string& path) {
+    if (!is_visible_command(&app)) return;
+    const std::string help = app.help("");
+    EXPECT_THAT(help, Not(HasSubstr("\n\n\n"))) << path;
+    EXPECT_THAT(help, Not(HasSubstr("[...]"))) << path;
+    const bool has_commands = !app.get_subcommands(is_visible_command).empty();
+    EXPECT_EQ(help.find("COMMAND") != std::string::npos, has_commands) << path;
+  });
+}
+
 // The message of wrong_use() for a command line.
 class WrongUse : public CommandLine {
  protected:

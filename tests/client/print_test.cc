@@ -35,6 +35,13 @@ TEST(PrintRows, ReportsEmptyTable) {
   EXPECT_EQ(output_of([] { print_rows(Json(), {{"name", "name"}}, "no robot"); }), "name\nno robot\n");
 }
 
+TEST(NumberText, DropsSignOfZero) {
+  EXPECT_EQ(number_text(-0.04, 1), "0.0");
+  EXPECT_EQ(number_text(-0.06, 1), "-0.1");
+  EXPECT_EQ(without_sign_of_zero("+0.0 %"), "0.0 %");
+  EXPECT_EQ(without_sign_of_zero("+10.0 %"), "+10.0 %");
+}
+
 TEST(EnergyText, ConvertsUnits) {
   EXPECT_EQ(energy_text(3600, "Wh"), "1.000");
   EXPECT_EQ(energy_text(-36, "Wh"), "-0.0100");

@@ -59,7 +59,6 @@ TEST(RobotParameters, ErrorNamesPointer) {
   lacking["limits"].erase("speed_m_s");
   EXPECT_EQ(parse_robot(lacking.dump()).error().field, "/limits/speed_m_s");
   EXPECT_FALSE(parse_robot("[1, 2"));
-  EXPECT_EQ(read_robot_file("no/such/file.json").error().fault, Fault::not_found);
 }
 
 }  // namespace

@@ -186,8 +186,8 @@ TEST_F(SimulateCommand, OverwritesOnlyWhenForced) {
     if (words[0] == "--truth") words.insert(words.end(), {"--log", file("b.lcmlog")});
     ::testing::internal::CaptureStderr();
     EXPECT_EQ(simulate(words), Exit::fault);
-    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "joulecast: " + std::string(flag) + ": " + mine +
-                                                            " is there already; --force writes over it\n");
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+              "joulecast: " + std::string(flag) + ": " + mine + " already exists; --force overwrites it\n");
     EXPECT_EQ(text_of(mine), "mine");
     EXPECT_FALSE(fs::exists(file("b.lcmlog")));
     words.emplace_back("--force");

@@ -59,28 +59,16 @@ TEST_F(DiagnosedModelTest, KeepsRefusalReasonDespiteForce) {
   EXPECT_EQ(forced->overridden, d.refusal);
 }
 
-TEST_F(DiagnosedModelTest, RequiresChoiceInGroup) {
+TEST_F(DiagnosedModelTest, TakesChoiceInGroup) {
   gap::Diagnosis d = gap::testing::made_diagnosis();
   d.effects[0].alternatives = {"viscous_friction"};
-  json earlier = gap::diagnosis_to_json(d);
-  earlier["adoption"]["choice_settles"] = true;
-  earlier["adoption"]["refusal"] = "coulomb_friction is not distinguished from viscous_friction";
-  const auto record = record_of(earlier.dump());
-  EXPECT_EQ(refused(record, {{}, true}).field, "/effect");
-  const auto chosen = diagnosed_model(*harness_.store, record, {{"coulomb_friction"}, false});
+  const auto chosen = diagnosed_model(*harness_.store, record_of(d), {{"coulomb_friction"}, false});
   ASSERT_TRUE(chosen) << describe(chosen.error());
   EXPECT_EQ(chosen->overridden, "");
-  EXPECT_EQ(refused(record, {{"coulomb_friction", "slope"}, false}).fault, Fault::invalid);
+  EXPECT_EQ(refused(record_of(d), {{"coulomb_friction", "slope"}, false}).fault, Fault::invalid);
 }
 
-TEST_F(DiagnosedModelTest, ReadsEarlierVersions) {
-  json old = gap::diagnosis_to_json(gap::testing::made_diagnosis());
-  old.erase("adoption");
-  old["effects"].erase(1);  // earlier versions have no covariates
-  old["effects"][0]["parameters"].erase("place");
-  const auto found = diagnosed_model(*harness_.store, record_of(old.dump()), {});
-  ASSERT_TRUE(found) << describe(found.error());
-  EXPECT_EQ(found->model.effects[0].id, "coulomb_friction");
+TEST_F(DiagnosedModelTest, RefusesRecordsWithoutOffer) {
   EXPECT_EQ(refused(record_of(std::string())).message, "holds nothing to adopt");
   EXPECT_EQ(refused(record_of("[]")).fault, Fault::corrupt);
 }

@@ -38,7 +38,7 @@ std::vector<Evidence> draw_mission(Rng& rng, const Features& truth, double scatt
 
 TEST(Correction, WithoutEvidenceIsThePrior) {
   const CorrectionFit fit;
-  const Correction prior = untried(), after = fit.posterior(prior);
+  const Correction prior = untried(Subject::stated_energy), after = fit.posterior(prior);
   for (std::size_t k = 0; k < feature_count; ++k) {
     EXPECT_NEAR(after.mean[k], prior.mean[k], 1e-12);
     EXPECT_NEAR(after.covariance[k][k], prior.covariance[k][k], 1e-12);
@@ -54,7 +54,7 @@ TEST(Correction, StatedUncertaintyIsCalibrated) {
   double squares = 0;
   constexpr int fits = 40;
   for (int run = 0; run < fits; ++run) {
-    const Correction prior = untried();
+    const Correction prior = untried(Subject::stated_energy);
     Features truth = prior.mean;
     for (std::size_t k = 0; k < feature_count; ++k)
       truth[k] += std::sqrt(prior.covariance[k][k]) * rng.normal();
@@ -76,7 +76,7 @@ TEST(Correction, StatedUncertaintyIsCalibrated) {
 // freedom times the likelihood of the mission's mean.
 TEST(Correction, FarEvidenceOverrulesThePrior) {
   constexpr double common = 0.03, expected_j = 100;
-  const Correction prior = untried();
+  const Correction prior = untried(Subject::stated_energy);
   const double scale = std::sqrt(prior.covariance[1][1]);
   for (const double truth : {1.0, 1.15, 1.5, 1.8}) {
     // The likelihood has this mean and variance: legs of equal weight, and what they share.
@@ -103,7 +103,7 @@ TEST(Correction, FarEvidenceOverrulesThePrior) {
 // A robot whose file is far from it has no outliers in its first mission: its legs weigh as much as those of
 // another.
 TEST(Correction, FirstMissionHasNoOutliers) {
-  const Correction prior = untried();
+  const Correction prior = untried(Subject::stated_energy);
   CorrectionFit near, far;
   near.add(std::vector<Evidence>(10, Evidence{{0, 100, 0, 0, 0}, 100, 8}), 0.03, prior);
   far.add(std::vector<Evidence>(10, Evidence{{0, 100, 0, 0, 0}, 145, 8}), 0.03, prior);
@@ -117,7 +117,7 @@ TEST(Correction, OneMissionKeepsCommonScatter) {
   std::vector<Evidence> legs(5000);
   for (Evidence& leg : legs) leg = {{100, 0, 0, 0, 0}, 110, 5};
   constexpr double common = 0.04;
-  Correction wide = untried();
+  Correction wide = untried(Subject::stated_energy);
   for (auto& row : wide.covariance) row.fill(0);
   for (std::size_t k = 0; k < feature_count; ++k) wide.covariance[k][k] = 1e4;
   fit.add(legs, common, wide);
@@ -128,7 +128,7 @@ TEST(Correction, OneMissionKeepsCommonScatter) {
 TEST(Correction, ForgettingWidensTheDeviation) {
   Rng rng(3);
   CorrectionFit fit;
-  const Correction prior = untried();
+  const Correction prior = untried(Subject::stated_energy);
   for (int m = 0; m < 10; ++m) fit.add(draw_mission(rng, prior.mean, 0.05, 0.02), 0.02, prior);
   const double before = fit.posterior(prior).covariance[1][1];
   fit.forget(0.1);
@@ -136,7 +136,7 @@ TEST(Correction, ForgettingWidensTheDeviation) {
 }
 
 TEST(Correction, OutlierLegCountsLittle) {
-  const Correction prior = untried();
+  const Correction prior = untried(Subject::stated_energy);
   std::vector<Evidence> legs(20, Evidence{{0, 500, 0, 0, 0}, 500, 10});
   CorrectionFit clean, pushed;
   clean.add(legs, 0.02, prior);

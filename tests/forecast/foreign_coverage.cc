@@ -102,7 +102,7 @@ void count_kind(std::uint64_t seed, bool exact, Counting& counting) {
       std::vector<const OwnFinding*> others;
       for (std::size_t other = 0; other < runs.size(); ++other)
         if (other != r) others.push_back(&findings[other][s]);
-      siblings[s] = pool(others);
+      siblings[s] = pool(static_cast<Subject>(s), others);
     }
     RobotForecast cold(runs[r].robot, runs[r].drive);
     cold.set_siblings(std::move(siblings));

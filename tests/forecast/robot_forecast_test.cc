@@ -154,7 +154,7 @@ TEST(RobotForecast, SiblingsHelpNewRobots) {
   for (std::size_t d = 0; d < subject_count; ++d) {
     std::vector<const OwnFinding*> others;
     for (const OwnFinding& f : found[d]) others.push_back(&f);
-    siblings[d] = pool(others);
+    siblings[d] = pool(static_cast<Subject>(d), others);
   }
   newcomer.set_siblings(std::move(siblings));
   const auto f = newcomer.forecaster();
@@ -278,6 +278,25 @@ TEST(RobotForecast, FirstPayloadsWidenIntervals) {
   EXPECT_LT(width(0), 0.05);
   EXPECT_GT(width(full_kg), 3 * width(0));
   EXPECT_GT(width(full_kg), 1.5 * width(0.3 * full_kg));
+}
+
+// A robot that has followed one plan exactly takes as long for another, with any payload.
+TEST(RobotForecast, FirstPlansLastAsStated) {
+  MadeMissions made(14);
+  RobotForecast forecast(made.robot, made.drive);
+  PastMission mission = made.next(1, 0.01, 0.02);
+  for (Leg& leg : mission.legs) {
+    if (leg.motion == Motion::stand) continue;
+    leg.planned_way = leg.way;
+    leg.planned_speed = leg.speed;
+    leg.planned_s = leg.duration_s;
+  }
+  forecast.learn(std::move(mission));
+  const auto f = forecast.forecaster();
+  const PlanSum sum = stated_drives(*f, made, made.robot.limits.payload_kg, Driving::stated);
+  const Prediction p = f->duration(sum);
+  EXPECT_NEAR(p.quantile(0.5) / sum.duration_s, 1, 0.01);
+  EXPECT_LT((p.quantile(0.95) - p.quantile(0.05)) / sum.duration_s, 0.2);
 }
 
 }  // namespace

@@ -63,5 +63,15 @@ TEST(Adopt, KeepsSupplyAsEffect) {
   EXPECT_EQ(corrections[0].fits, -supply_w);
 }
 
+TEST(Adopt, CorrectsStrengthWithValue) {
+  const auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
+  ASSERT_TRUE(robot);
+  const robot::AdoptedEffect found{"payload_mass_error", {{"ratio", 0}, {"extra_kg", 12}}};
+  const auto corrections = corrections_of(*robot, {&found, 1}, std::array{2.0});
+  ASSERT_EQ(corrections.size(), 1u);
+  EXPECT_EQ(corrections[0].parameter, "effects.payload_mass_error.extra_kg");
+  EXPECT_EQ(corrections[0].fits, 12);
+}
+
 }  // namespace
 }  // namespace joulecast::gap

@@ -67,6 +67,15 @@ TEST(VerdictText, NamesChannelAndVariableOutside) {
                   "the yaw rate."));
 }
 
+TEST(VerdictText, AddsUnknownCauseToEffects) {
+  Diagnosis d = with_effect(Verdict::effects);
+  d.outside = outside_of("wheel_torque", "acceleration");
+  EXPECT_THAT(
+      said_of(d),
+      ElementsAre("In addition to the effects found, an unknown cause (probability > 97\u00a0%) shows in "
+                  "the torque at the wheels and follows the acceleration."));
+}
+
 TEST(VerdictText, ReportsDependenceOnRecentMotion) {
   Diagnosis d = with_effect(Verdict::outside);
   d.outside = outside_of("battery_power_from_motors", "recent_motion");

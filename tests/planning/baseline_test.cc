@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "dynamics/straight.h"
 #include "tests/planning/robots.h"
 #include "tests/study/ramp/ramp.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::planning {
 namespace {

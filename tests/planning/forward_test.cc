@@ -80,7 +80,7 @@ struct Driven {
 
 Driven drive(const dynamics::DriveModel& model, const Profile& rows, double inductance_h) {
   Drive problem(model, rows, inductance_h);
-  energy::Cvode cvode(8, energy::Method::bdf, problem);
+  energy::Cvode cvode(8, problem);
   const auto start = problem.planned(0);
   auto y = cvode.state();
   std::fill(y.begin(), y.end(), 0.0);

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "tests/planning/robots.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::planning {
 namespace {

@@ -129,6 +129,18 @@ TEST(Path, HeadingsIntegrateCurvature) {
   }
 }
 
+// An arc and a straight, each stated in one piece or in three: the same curvature at every place.
+TEST(Path, SplitPiecesKeepTransitions) {
+  const auto whole = made_path({Arc{3, 0.5}, Straight{5}}).runs.at(0);
+  const auto parts =
+      made_path({Arc{3, 0.4}, Arc{3, 0.08}, Arc{3, 0.02}, Straight{0.03}, Straight{0.07}, Straight{4.9}})
+          .runs.at(0);
+  for (double way = 0; way < whole.length(); way += 0.003) {
+    EXPECT_NEAR(parts.at(way).curvature_1_m, whole.at(way).curvature_1_m, 1e-9) << "at " << way;
+  }
+  EXPECT_NEAR(parts.length(), whole.length(), 1e-12);
+}
+
 TEST(Path, DwellsAndPayloadsStop) {
   const Path path = made_path({Dwell{2}, Straight{1}, PayloadChange{15}, Dwell{5}, Straight{2}, Dwell{1}},
                               PathOptions{.start = {}, .payload_kg = 3});

@@ -7,6 +7,7 @@
 #include "planning/cost_table.h"
 #include "planning/line.h"
 #include "tests/planning/robots.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::planning {
 namespace {
@@ -130,7 +131,7 @@ TEST(Planner, PriceOfTimeMeetsTheDeadline) {
       EXPECT_EQ(tooShort.error().fault, Fault::infeasible);
       EXPECT_EQ(tooShort.error().field, "deadline_s");
       const std::string& told = tooShort.error().message;
-      const double shortest = std::stod(told.substr(told.rfind("no less than ") + 13));
+      const double shortest = std::stod(told.substr(told.rfind("at least ") + 9));
       EXPECT_NEAR(relaxed->certificate.shortest_time_s, shortest, 1e-6);  // as it is rounded
       for (double share : {0.7, 0.3, 0.02}) {
         problem.deadline_s = shortest + share * (relaxed->summary.duration_s - shortest);

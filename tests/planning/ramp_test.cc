@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/planning/robots.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::planning {
 namespace {

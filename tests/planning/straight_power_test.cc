@@ -1,6 +1,7 @@
+#include "tests/support/straight_power.h"
+
 #include <gtest/gtest.h>
 
-#include "dynamics/straight.h"
 #include "tests/planning/robots.h"
 #include "tests/study/ramp/ramp.h"
 
@@ -93,7 +94,7 @@ TEST(StraightPower, ReproducesTables23And24) {
     motor += motor;
     LineTask task{dynamics::straight_power(robot, row.payload_kg).over_distance(), 10};
     const double combined_j = ramp_in_time(task, row.duration_s, 0.25)->energy_j();
-    task.power = motor.rescaled(0.095);
+    task.power = rescaled(motor, 0.095);
     return Energies{ramp_in_time(task, row.duration_s, 0.25)->energy_j(), combined_j};
   };
   for (const Row& row : rows) {

@@ -337,6 +337,24 @@ TEST(CheckRecordings, NamesUnitsByPowerAlone) {
   }
 }
 
+// Turning on grip costs several times the power of straight driving, and the file has nothing of it.
+TEST(CheckRecordings, NamesUnitsDespiteTurningCosts) {
+  const made::Robot robot = with_power_alone();
+  for (const double factor : {0.1, 10.0}) {
+    telemetry::RecordingSet set = robot.recordings;
+    alter::each_sample(set, [&](signals::Sample& s) {
+      const double turning = std::fabs(s.wheel_velocity_rad_s[0] - s.wheel_velocity_rad_s[1]);
+      s.battery_current_a += 100 * turning / s.battery_voltage_v;
+    });
+    alter::multiply(set, {reading::battery_current}, factor);
+    const auto checks = check_recordings(set, robot.model);
+    const Check* check = find(checks, "battery_current_scale");
+    ASSERT_TRUE(check) << factor;
+    EXPECT_TRUE(check->contradicted) << check->says;
+    EXPECT_NEAR(check->value, factor, 0.1 * factor) << check->says;
+  }
+}
+
 // Friction, mass and a base load that the file does not have are no units.
 TEST(CheckRecordings, AcceptsOtherPhysicsAsSound) {
   const made::Robot robot = with_power_alone();

@@ -112,7 +112,8 @@ TEST_F(Faults, WeighsCurrentAgainstWheels) {
   const double none = heavy(0.1, 0.5) + heavy(0.1, 0.2) + heavy(10, 0.7), tenth = 5.5;
   const double left = 0.1 * 3.6 * 3.6, wheels = 4 + heavy(left, 0.5) + heavy(left, 0.2) + heavy(10, 0.7);
   EXPECT_NEAR(found.probability[0], 1 / (1 + std::exp(tenth - none) + std::exp(tenth - wheels)), 1e-9);
-  EXPECT_NEAR(found.gain, none - tenth, 1e-9);
+  EXPECT_NEAR(found.any[0],
+              1 - std::exp(tenth - none) / (1 + std::exp(tenth - none) + std::exp(tenth - wheels)), 1e-9);
   // A misfit as large as the parts themselves leaves nothing to conclude.
   for (ChannelEvidence& e : all) e.unexplained = 3;
   EXPECT_TRUE(explain_faults(all, two).faults.empty());
@@ -133,6 +134,43 @@ TEST_F(Faults, AddsNearlyEqualFactors) {
   const double none = std::exp(4 - 2 * heavy(3.6, 0.05)),
                feet = std::exp(4 - 5.5 - 2 * heavy(3.6 / 3.2808, 0.05));
   EXPECT_NEAR(found.probability[0], (1 + feet) / (1 + feet + none), 1e-9);
+}
+
+// Wheels at half their speed, with a radius of 0.4 m: neither "half" nor "in m/s at the rim" is certain, but
+// one of them is.
+TEST_F(Faults, AddsFactorsOfOneChannel) {
+  robot_.kinematics.wheel_radius_m = 0.4;
+  const std::vector<ChannelEvidence> some{heavy_evidence(2, {{reading::wheel_velocity, -1}}, 0.1),
+                                          heavy_evidence(2, {{reading::wheel_velocity, -1}}, 0.1)};
+  std::vector<ChannelFault> two;
+  for (const ChannelFault& f : known_faults(robot_))
+    if (f.cause == "given in m/s at the rim" || f.cause == "counted half (0.5 times the motion)")
+      two.push_back(f);
+  ASSERT_EQ(two.size(), 2u);
+  const FaultExplanation found = explain_faults(some, two);
+  ASSERT_EQ(found.faults.size(), 1u);
+  const double none = std::exp(-2 * heavy(2, 0.1)), rim = std::exp(-4 - 2 * heavy(2 * 0.4, 0.1)),
+               half = std::exp(-5.5 - 2 * heavy(1, 0.1));
+  EXPECT_NEAR(found.probability[0], std::max(rim, half) / (none + rim + half), 1e-9);
+  EXPECT_NEAR(found.any[0], (rim + half) / (none + rim + half), 1e-9);
+  EXPECT_LT(found.probability[0], 0.95);
+  EXPECT_GT(found.any[0], 0.98);
+}
+
+// Evidence that is as likely with the error as without it, prior included: a probability of one half is told.
+TEST_F(Faults, TellsUncertainError) {
+  const auto reversed = std::ranges::find(faults_, "yaw_rate_reversed", &ChannelFault::id);
+  const std::vector<ChannelFault> one{*reversed};
+  for (const double trust : {reversed->surprise - 2, reversed->surprise, reversed->surprise + 1}) {
+    const std::vector<ChannelEvidence> some{evidence(-1, {{reading::yaw_rate, 1}}, 0.3, trust)};
+    const double error = 1 / (1 + std::exp(reversed->surprise - trust));
+    const FaultExplanation found = explain_faults(some, one);
+    const bool told = error > 0.2;
+    EXPECT_EQ(found.faults.size(), told ? 1u : 0u) << trust;
+    if (told) {
+      EXPECT_NEAR(found.any.at(0), error, 1e-9);
+    }
+  }
 }
 
 // The map's distance is 3 times that of wheels and gyro. Wheel speeds in m/s would explain most of it, but by

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "report/profile_drawing.h"
-#include "report/svg.h"
 #include "tests/study/exploration/exploration_drawing.h"
+#include "tests/study/exploration/svg.h"
 
 namespace joulecast::report {
 namespace {
@@ -81,6 +81,15 @@ TEST(ProfileDrawing, DrawsMotionsInEveryPanel) {
   const std::string turn = draw_profile("amr", motions);
   EXPECT_EQ(count(turn, "<polyline"), 2u * 3u);
   EXPECT_EQ(count(turn, "speed, m/s"), 0u);
+}
+
+TEST(ProfileDrawing, EscapesItsTexts) {
+  const std::string text =
+      draw_profile("a < b & \"c\"\x01",
+                   std::vector<DrawnMotion>{{"<script>", "plan", {0, 1}, {0, 1}, {0, 0}, {5, 9}, {0, 7}}});
+  expect_well_formed(text);
+  EXPECT_NE(text.find("a &lt; b &amp; &quot;c&quot;<"), std::string::npos);
+  EXPECT_EQ(text.find("<script>"), std::string::npos);
 }
 
 }  // namespace

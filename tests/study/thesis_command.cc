@@ -100,7 +100,7 @@ Exit run(const ThesisCommandOptions& options) {
 void add_thesis(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<ThesisCommandOptions>();
   auto* command = program.add_subcommand(
-      "thesis", "The thesis's tables: printed value, ours, difference and what explains it");
+      "thesis", "Compare the thesis's tables with computed values and explain the differences");
   auto* table = command->add_option("--table", options->table, "only this one, e.g. 4-1")->type_name("ID");
   auto* figure = add_option(*command, "--figure", options->figure, "data of this figure",
                             one_of({"4-2a", "4-2b", "4-2c", "4-2d"}));

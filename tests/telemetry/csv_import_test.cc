@@ -613,16 +613,16 @@ TEST(ImportLayout, DamagedRowsAreLeftOut) {
     return std::to_string(report.samples) + (report.notes.empty() ? "" : ": " + report.notes[0]);
   };
   const std::string left_out =
-      "2: 1 damaged rows are left out (cut, or with zero bytes), the first at line 4";
+      "2: damaged rows (truncated or with zero bytes) left out: 1, the first at line 4";
   const std::string zeros(9, '\0');
   for (const std::string& tail : {std::string("2,1"), std::string("2,1\n"), std::string("2,\"1"),
                                   std::string("2,1,1,2e"), zeros, "2,1" + zeros, zeros + "\n"})
     EXPECT_EQ(rows_and_note(tail), left_out) << tail;
-  EXPECT_THAT(rows_and_note("2,1" + zeros + "1,1\n3,1,1,25\n"), HasSubstr("3: 1 damaged rows"));
-  EXPECT_EQ(rows_and_note("t,r,l,v\n2,1,1,25\n"), "3: the header comes 1 times more");
+  EXPECT_THAT(rows_and_note("2,1" + zeros + "1,1\n3,1,1,25\n"), HasSubstr("3: damaged rows"));
+  EXPECT_EQ(rows_and_note("t,r,l,v\n2,1,1,25\n"), "3: repeated headers: 1");
   EXPECT_EQ(rows_and_note("2,1,1,25,,\n"), "3");
   EXPECT_THAT(rows_and_note("2,1\n3,1,1,25\n"),
-              HasSubstr("x.csv: line 4: has 2 fields where the header has 4: where columns"));
+              HasSubstr("x.csv: line 4: has 2 fields, the header 4. If its columns"));
   EXPECT_EQ(rows_and_note("2,1,1,x\n"),
             R"(x.csv: line 4: column 'v': 'x' is no number; "no_value" lists words for no value)");
 }
@@ -651,7 +651,7 @@ TEST(ImportLayout, EncodingAndSeparatorAreDetected) {
         std::string("t;r;l;v;Temp \xB0;\n0;1;1;25.5;3;\n1;1;1;26;3;\n")})
     EXPECT_EQ(voltages(csv), "255 260 ") << csv;
   EXPECT_THAT(read_table("a;b\n1;2\n", in_seconds).error().message,
-              HasSubstr("column 't' is missing; there are 'a', 'b'"));
+              HasSubstr("column 't' is missing; the table has 'a', 'b'"));
 }
 
 TEST(ImportLayout, NumbersInManyForms) {
@@ -694,13 +694,13 @@ TEST(ImportLayout, LinesBeforeHeaderAreLeftOut) {
 
 TEST(ImportLayout, ShortHeadersAreExplained) {
   for (const auto& [csv, line, advice] :
-       {std::tuple{"t,r,l,v\n0,1,1,25,0.5\n1,1,1,25,0.5\n", "line 2", R"("header" names every column)"},
-        {"t;r;l;v\n0;1;1;25;0.5\n1;1;1;25;0.5\n", "line 2", R"("header" names every column)"},
+       {std::tuple{"t,r,l,v\n0,1,1,25,0.5\n1,1,1,25,0.5\n", "line 2", R"(Name every column in "header")"},
+        {"t;r;l;v\n0;1;1;25;0.5\n1;1;1;25;0.5\n", "line 2", R"(Name every column in "header")"},
         {"t,r,l,v\n0,1,1,25\n1,1,1,25,0.5\n2,1,1,25,0.5\n", "line 3", "split the table here"}}) {
     const auto read = read_table(csv, in_seconds);
     ASSERT_FALSE(read);
     EXPECT_THAT(read.error().field, HasSubstr(line)) << csv;
-    EXPECT_THAT(read.error().message, HasSubstr("has 5 fields where the header has 4"));
+    EXPECT_THAT(read.error().message, HasSubstr("has 5 fields, the header 4"));
     EXPECT_THAT(read.error().message, HasSubstr(advice));
   }
   const auto named = read_table("t,r,l,v\n0,1,1,25,0.5\n1,1,1,26,0.5\n", in_seconds,
@@ -742,7 +742,7 @@ TEST(ImportLayout, JoinedFilesKeepTheirMarks) {
 TEST(ImportLayout, EqualNamesNeedNumber) {
   const std::string csv = "t,r,l,v,t\n0,1,1,25,10\n1,1,1,25,11\n";
   EXPECT_THAT(read_table(csv, in_seconds).error().message,
-              HasSubstr("columns 1 and 5 are called 't': the mapping names them 't#1' and 't#2'"));
+              HasSubstr("columns 1 and 5 are both called 't': write 't#1' or 't#2' in the mapping"));
   const auto second = read_table(csv, R"("column": "t#2", "unit": "s")");
   EXPECT_EQ((*second)[0].recording.samples[0].utime_us, 10'000'000);
   EXPECT_THAT(read_table(csv, R"("column": "t#3", "unit": "s")").error().message,

@@ -49,7 +49,7 @@ TEST(CsvTable, ReadsQuotedFields) {
 TEST(CsvTable, ErrorsNameLine) {
   EXPECT_THAT(read_all("").error, ::testing::HasSubstr("line 1"));
   EXPECT_THAT(read_all("a,b\n1,2\n1,2,3\n").error,
-              ::testing::HasSubstr("line 3: has 3 fields where the header has 2"));
+              ::testing::HasSubstr("line 3: has 3 fields, the header 2"));
   EXPECT_THAT(read_all("a,b\n\"1\n2\",\"open\n").error,
               ::testing::HasSubstr("line 3: a quoted field is never closed"));
   EXPECT_THAT(read_all("a,b\n\"1\"x,2\n").error, ::testing::HasSubstr("line 2: text follows a quoted field"));

@@ -18,12 +18,13 @@ constexpr std::int64_t tracker_second_us = 1'000'000;
 
 // "open m-1 @5" or "close m-1 @9 finished", times in seconds.
 std::vector<std::string> told(const MissionActions& actions) {
+  constexpr const char* ends[] = {"finished", "aborted", "superseded", "unfinished", "idle", "expired"};
   std::vector<std::string> lines;
   for (const MissionAction& action : actions) {
     const std::string where = action.mission_id + " @" + std::to_string(action.utime_us / tracker_second_us);
     lines.push_back(action.kind == MissionAction::Kind::open
                         ? "open " + where
-                        : "close " + where + " " + std::string(name_of(action.end)));
+                        : "close " + where + " " + ends[static_cast<std::size_t>(action.end)]);
   }
   return lines;
 }

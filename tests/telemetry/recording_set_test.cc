@@ -75,7 +75,7 @@ TEST(RecordingSet, RequiresOneRobot) {
   EXPECT_THAT(one->notes, IsEmpty());
   const auto any = log.load();
   ASSERT_FALSE(any);
-  EXPECT_THAT(describe(any.error()), AllOf(HasSubstr("2 robots, a, b"), HasSubstr("name the one")));
+  EXPECT_THAT(describe(any.error()), AllOf(HasSubstr("2 robots, a, b"), HasSubstr("--robot-id")));
   const auto other = log.load("c");
   ASSERT_FALSE(other);
   EXPECT_THAT(describe(other.error()), HasSubstr("no telemetry of c, only of a, b"));
@@ -194,7 +194,7 @@ TEST(RecordingSet, ListsFewOfManyNames) {
   missions.back().samples[5].wheel_velocity_rad_s[1] = signals::unmeasured;
   const auto set = make_recording_set("a", missions);
   ASSERT_TRUE(set) << describe(set.error());
-  EXPECT_THAT(set->notes, ElementsAre(HasSubstr("mission empty holds no motion"),
+  EXPECT_THAT(set->notes, ElementsAre(HasSubstr("mission empty contains no motion"),
                                       HasSubstr("1 samples without wheel speeds"),
                                       HasSubstr("missions s0, s1, s2 and 3 more")));
 }
@@ -207,7 +207,7 @@ TEST(RecordingSet, RequiresAnInformativeMission) {
   const test::TemporaryFile empty;
   const auto log = load_recordings({&empty.path(), 1});
   ASSERT_FALSE(log);
-  EXPECT_THAT(describe(log.error()), HasSubstr("is no LCM event log, or an empty one"));
+  EXPECT_THAT(describe(log.error()), HasSubstr("is not an LCM event log, or is empty"));
 }
 
 }  // namespace

@@ -733,6 +733,7 @@ await check('the floor shows energy and gap by square', async () => {
   expect(Math.abs(map.distance_m / distance - 1) < 0.03, `${map.distance_m} m, ${distance} m of missions`);
   const figures = await page.locator('.readouts').first().textContent();
   expect(figures.includes((map.energy_j / map.distance_m / 3.6).toFixed(1)), figures);
+  expect(figures.includes(`${map.ratio.toFixed(3)}while driving`), `ratio without rest: ${figures}`);
   const canvas = page.getByRole('application', { name: /^Map of the floor: consumption/ });
   await canvas.focus();
   await page.keyboard.press('ArrowRight');
@@ -1037,6 +1038,16 @@ await check('the comparison includes payload changes during a mission', async ()
   await page.getByText('payload as the robot reported it on the way').waitFor();
   await go(page, `#/missions/${mission.id}`);
   await page.locator('.bars tr').nth(2).waitFor();
+});
+
+await check('a payload that was not reported is assumed from the start', async () => {
+  const payloads = '**/telemetry?from_utime_us=*&limit=1';
+  await page.route(payloads, (route) => route.fulfill({ json: { payload_kg: [null] } }));
+  await go(page, '#/missions');
+  await page.getByRole('table').first().waitFor();
+  await go(page, `#/missions/${mission.id}`);
+  await page.getByText(/payload at the start, .+ on all legs: later changes are unknown/).waitFor();
+  await page.unroute(payloads);
 });
 
 await check('the trace is read at the cursor and zoomed', async () => {
@@ -1347,9 +1358,19 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
         },
       ],
       corrections: [{ parameter: 'idle_power_w', file: 20, fits: 31, sd: 0.4 }],
+      effects: [
+        {
+          ...job.result.effects[0],
+          id: 'friction_asymmetry',
+          parameters: {
+            ratio: { value: 0.4, sd: 0.1, unit: '1' },
+            side: { value: 0, sd: null, unit: '1' },
+            rate_rad_s: { value: 0, sd: null, unit: 'rad/s' },
+          },
+        },
+      ],
       adoption: {
-        refusal: 'coulomb_friction is not distinguished from viscous_friction: name the one to adopt',
-        choice_settles: true,
+        refusal: null,
         corrects_file: true,
         effects: [
           {
@@ -1369,6 +1390,12 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
   await page.getByText('The battery current is reversed.').waitFor();
   await page.getByText('It is not used below.').waitFor();
   await page.getByText('31.00 ± 0.40').waitFor();
+  equal(
+    (await page.locator('.effects tbody tr').first().locator('td > div .note').allTextContents()).join(),
+    'by,side',
+    'parameters, without those of zero',
+  );
+  await page.getByText('side right').waitFor();
   const choice = page.getByRole('combobox', { name: 'Adopt which of these' });
   equal(
     (await choice.locator('option').allTextContents()).join(),
@@ -1390,7 +1417,7 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
   await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
   await page.unroute(`**/v1/robots/worn-01/models`);
-  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
+  Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive' });
   refused.result.adoption.effects[0].instead = [];
   await openAnew(page, diagnosis);
   await page.getByText('Not recommended:').waitFor();
@@ -1488,6 +1515,7 @@ await check('a finding is tested, adopted and rolled back', async () => {
   await page.locator('.test tbody tr').first().waitFor();
   equal(await page.locator('.test tbody tr').count(), 2, 'missions tested on');
   equal((await get('/v1/robots/worn-01')).model_version, 1, 'a test alone adopts nothing');
+  await page.getByText(/^On 2 missions not used for the fit, the energy error changes from/).waitFor();
   const [before, after] = (await page.locator('.verdict-box .verdict b').allTextContents())
     .slice(-2)
     .map(number);
@@ -1766,7 +1794,8 @@ await check('a robot is added, reviewed, edited and removed', async () => {
   const file = { ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: 'added-01' };
   await go(page, '#/fleet');
   await page.getByRole('link', { name: 'Add a robot' }).click();
-  await page.getByText(/values are missing/).waitFor();
+  const missing = await page.getByText(/values are missing/).textContent();
+  expect(/wheel radius/.test(missing) && !/[._]/.test(missing), `names of the form: ${missing}`);
   await page
     .getByLabel('Load a robot file')
     .setInputFiles(asFile('added.json', 'application/json', JSON.stringify(file)));
@@ -1780,6 +1809,7 @@ await check('a robot is added, reviewed, edited and removed', async () => {
   await capacity.fill('-1');
   const add = page.getByRole('button', { name: 'Add this robot', exact: true });
   await until('a fault', () => add.isDisabled());
+  equal(await add.getAttribute('title'), 'Values are missing or invalid.', 'the reason');
   await capacity.fill(String(file.battery.capacity_ah));
   await until('no fault', () => add.isEnabled());
   await adopt(page, 'Add this robot');

@@ -3,7 +3,6 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "answers/json/drive_json.h"
 #include "answers/json/mission_json.h"
 #include "base/try.h"
 

@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "answers/json/drive_json.h"
 #include "answers/json/mission_json.h"
 #include "base/try.h"
 

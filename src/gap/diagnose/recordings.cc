@@ -73,6 +73,7 @@ class Diagnoser {
     lower_noise_floor();
     state_offer(
         *fit_, answer_, [this](const auto& effect) { return moved_w(effect); }, true, d_);
+    weigh_by_checks(d_);
     finish();
     return std::move(d_);
   }
@@ -377,12 +378,6 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const auto sides = split_at_step(trusted, checks);
   Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, progress, checks).run();
   if (!d) return d;
-  double corrected = 1;  // probability of the corrections, on which those of causes depend
-  for (const Check& check : checks)
-    if (!check.contradicted && check.probability > 0) corrected *= check.probability;
-  d->verdict_probability *= corrected;
-  d->outside.probability *= corrected;
-  for (DiagnosedEffect& e : d->effects) e.probability *= corrected, e.group *= corrected;
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {

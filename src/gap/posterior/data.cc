@@ -66,12 +66,12 @@ void add_readings(const windows::Track& c, double period_s, double voltage_v, st
   }
 }
 
-// Segments of missions, equally long in each; many short missions share blocks.
-std::size_t assign(std::span<Window> windows, std::span<const double> length_s, std::size_t& blocks) {
+// Segments of missions, equally long in each; many short missions share blocks. Returns their number.
+std::size_t assign(std::span<Window> windows, std::span<const double> length_s) {
   double total = 0;
   for (const double s : length_s) total += s;
   std::vector<std::size_t> parts, first;
-  blocks = 0;
+  std::size_t blocks = 0;
   double covered = 0;
   for (const double s : length_s) {
     if (length_s.size() > most_blocks) {
@@ -148,7 +148,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     d.battery_voltage_v.push_back(w.battery_voltage_v);
     w.battery_voltage_v = voltage_v[w.mission];
   }
-  assign(d.windows, length_s, d.blocks);
+  d.blocks = assign(d.windows, length_s);
   if (d.motors) {
     const auto known = [](double p) { return std::isfinite(p); };
     std::vector<double> power_w = measured_power(d.windows, robot, false);
@@ -158,20 +158,17 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     for (std::size_t m = 0; m < missions.size(); ++m)
       add_readings(tracks[m], windows::median_period_s(missions[m]), voltage_v[m], m,
                    total_s / static_cast<double>(most_power_rows), d.rows);
-    assign(d.rows.instants, length_s, d.blocks);
+    d.blocks = assign(d.rows.instants, length_s);
   }
   d.power = d.rows.size() >= fewest_rows;
-  if (d.power) {
-    double sum = 0;
-    for (const double p : d.rows.power_w) sum += std::fabs(p);
-    d.mean_power_w = std::max(sum / static_cast<double>(d.rows.size()), 1e-3);
-  } else {
-    d.rows = {};
-    double sum = 0;
-    const dynamics::DriveModel model(robot, d.in_file);
-    for (const Window& w : d.windows) sum += std::fabs(metered_powers(model, w).battery_w);
-    d.mean_power_w = std::max(sum / static_cast<double>(d.windows.size()), 1e-3);
-  }
+  if (!d.power) d.rows = {};
+  const dynamics::DriveModel model(robot, d.in_file);
+  double sum = 0;
+  for (const double p : d.rows.power_w) sum += std::fabs(p);
+  for (const Window& w : d.windows)
+    if (!d.power) sum += std::fabs(metered_powers(model, w).battery_w);
+  const std::size_t count = d.power ? d.rows.size() : d.windows.size();
+  d.mean_power_w = std::max(sum / static_cast<double>(count), 1e-3);
   return d;
 }
 

@@ -9,6 +9,7 @@
 #include "base/try.h"
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
+#include "gap/verdict/words.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap::posterior {
@@ -123,10 +124,11 @@ class Explainer {
 
   void state_useless_function() {
     a_.reasons.push_back(fmt::format(
-        "a dependence on {} does not reduce the error on held-out data enough to be the verdict: {:.1f} % of "
-        "the power with it, {:.1f} % without",
-        fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
-        100 * a_.held_out.function_effects));
+        "a dependence on {} is not the verdict: it reduces the error on held-out data by less than {:.0f} % "
+        "of the power ({:.1f} % with it, {:.1f} % without)",
+        words_of(fit_.functions[*summary_.function].variable), 100 * clear_gain,
+        100 * a_.held_out.function_all,
+        100 * std::min(a_.held_out.function_effects, a_.held_out.function_file)));
   }
 
   // The posterior given that no function is present.
@@ -176,8 +178,8 @@ class Explainer {
       withhold(
           e,
           fmt::format(
-              "the effect {} is not named: its share of the explained gap on held-out data is {:.1f}\u00a0%; "
-              "a named effect has {:.0f} to {:.0f}\u00a0%",
+              "the effect {} is not named: its share of the explained gap on held-out data is {:.1f}\u00a0%, "
+              "must be {:.0f} to {:.0f}\u00a0%",
               e.id, 100 * e.share, 100 * least_gap_share, 100 * most_gap_share));
     e.at_bound = own.size() == 1 && at_bound(hypothesis, own[0]);
     if (e.group >= named && e.at_bound)

@@ -119,10 +119,12 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
     if (!change) {
       const auto had = std::ranges::find(robot.effects, found[k].id, &robot::AdoptedEffect::id);
       const auto in_file = had == robot.effects.end() ? std::nullopt : std::optional(as_found(*had));
-      const double before = in_file && *in_file ? (**in_file).values[0] : 0;
-      corrections.push_back(
-          {fmt::format("effects.{}.{}", found[k].id, active->effect->info().parameters[0].name), before,
-           before + active->values[0], deviations[k]});
+      const auto parameters = active->effect->info().parameters;
+      std::size_t at = 0;  // of its strength, which has a value
+      while (at + 1 < parameters.size() && active->values[at] == 0) ++at;
+      const double before = in_file && *in_file ? (**in_file).values[at] : 0;
+      corrections.push_back({fmt::format("effects.{}.{}", found[k].id, parameters[at].name), before,
+                             before + active->values[at], deviations[k]});
       continue;
     }
     const double value = mean_of(file[Json::json_pointer(change->pointer)]);

@@ -82,6 +82,17 @@ void state_held_out(const HeldOut& h, Diagnosis& d) {
   s.remaining_over_noise_floor = s.after / d.noise_floor;
 }
 
+void weigh_by_checks(Diagnosis& d) {
+  const double sound = sound_readings(d.checks);
+  d.verdict_probability *= sound;
+  d.outside.probability *= sound;
+  for (DiagnosedEffect& e : d.effects) e.probability *= sound, e.group *= sound;
+  if (sound >= posterior::named) return;
+  d.verdict = Verdict::inconclusive;
+  d.corrections.clear();
+  d.refusal = error_words(sound);
+}
+
 void state_offer(const posterior::Fit& fit, const Explained& answer, const MovedPower& moved_w,
                  bool other_channels, Diagnosis& d) {
   struct Offered {

@@ -15,6 +15,9 @@ void state_effects(const posterior::Explained& answer, double mean_power_w, Diag
 // shrinkage. Does nothing where no power was held out.
 void state_held_out(const posterior::HeldOut& held_out, Diagnosis& diagnosis);
 
+// Multiplies probabilities by sound_readings(). Below one half the verdict is inconclusive.
+void weigh_by_checks(Diagnosis& diagnosis);
+
 // Mean |change of power| by one effect [W]; 0 without power.
 using MovedPower = std::function<double(const dynamics::ActiveEffect&)>;
 

@@ -28,12 +28,6 @@ const Table<DiagnosedParameter>& value_table() {
   return table;
 }
 
-// Of earlier versions.
-constexpr const char* controls_words = "surrogates of earlier versions; no longer made";
-Schema controls() {
-  return described::or_null(described::of_reference("gap.controls"), true);
-}
-
 const Table<Check>& check_table() {
   static const auto table =
       Table<Check>()
@@ -49,7 +43,9 @@ const Table<Check>& check_table() {
           .known("factor", &Check::factor,
                  "by which the channel is divided for the diagnosis: -1 for a reversed sign")
           .value("probability", &Check::probability,
-                 "of a wrong sign, unit or side, against every other explanation")
+                 "of a wrong sign, unit or side, against every other explanation; of a channel that is used "
+                 "as it "
+                 "is, of any error of the readings")
           .only([](const Check& check) { return check.probability > 0; })
           .known("first_mission", &Check::first_mission,
                  "of a step between missions: index of the first one after it")
@@ -113,7 +109,6 @@ const Table<DiagnosedEffect>& effect_table() {
                           "probability that it or one of its alternatives is present; absent from diagnoses "
                           "of earlier versions")
           .later()
-          .elsewhere("controls", controls(), controls_words)
           .number_or_null("power_w", &E::power_w, "mean |change of battery power|")
           .later()
           .number_or_null("varies", &E::varies,
@@ -145,7 +140,6 @@ const Table<Outside>& outside_table() {
               },
               "power of that form, at the beginning and at the end of a mission")
           .later()
-          .elsewhere("controls", controls(), controls_words)
           .text_or_null(
               "says", [](const O& o) { return o.channel.empty() ? std::string() : outside_words(o); },
               "the same in a sentence")
@@ -172,9 +166,7 @@ const Table<Shrinkage>& shrinkage_table() {
           .number_or_null("remaining_over_noise_floor", &S::remaining_over_noise_floor,
                           "remaining gap relative to the noise floor")
           .value("parts", &S::parts, "number of parts that were left out, one after the other")
-          .later()
-          .elsewhere("agreeing", described::of_type("integer"),
-                     "number of parts without which the same effects were found; of earlier versions");
+          .later();
   return table;
 }
 
@@ -349,17 +341,7 @@ const Table<Diagnosis>& diagnosis_table() {
 }
 
 described::Schemas diagnosis_schemas() {
-  const Schema count = described::of_type("integer");
-  return {{"gap", diagnosis_table().schema()},
-          {"gap.value", value_table().schema()},
-          {"gap.controls",
-           described::of_object(
-               {}, {},
-               {{"surrogates",
-                 described::with_words(
-                     count, "number of simulated copies of these recordings without the effect found")},
-                {"named_in",
-                 described::with_words(count, "number of surrogates in which the same effect was found")}})}};
+  return {{"gap", diagnosis_table().schema()}, {"gap.value", value_table().schema()}};
 }
 
 nlohmann::ordered_json diagnosis_to_json(const Diagnosis& diagnosis) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gap/verdict/words.h"
+
 namespace joulecast::gap {
 namespace {
 
@@ -187,7 +189,7 @@ std::vector<NextDrive> drives_for(const Outside& outside) {
   });
   const auto* found = std::ranges::find(advice, outside.follows, &Advice::variable);
   if (found == advice.end()) return {};
-  return {{std::string(found->manoeuvre), "a dependence on " + std::string(found->variable) + " from chance",
+  return {{std::string(found->manoeuvre), "a dependence on " + words_of(found->variable) + " from chance",
            missing}};
 }
 

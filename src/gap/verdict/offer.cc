@@ -17,52 +17,11 @@ using Json = nlohmann::json;
 using described::Table;
 using robot::AdoptedEffect;
 
-// `value_of` takes the number of one parameter.
-template <class ValueOf>
-AdoptedEffect effect_from(const Json& document, ValueOf value_of) {
+AdoptedEffect effect_from(const Json& document) {
   AdoptedEffect effect{document.at("id").get<std::string>(), {}};
-  for (const auto& [name, value] : document.at("parameters").items()) {
-    if (const Json& number = value_of(value); number.is_number())
-      effect.parameters.emplace_back(name, number.template get<double>());
-  }
+  for (const auto& [name, value] : document.at("parameters").items())
+    if (value.is_number()) effect.parameters.emplace_back(name, value.get<double>());
   return effect;
-}
-
-Offer offer_told(const Json& adoption) {
-  const auto itself = [](const Json& value) -> const Json& { return value; };
-  Offer offer;
-  for (const Json& e : adoption.at("effects")) {
-    OfferedEffect& offered = offer.effects.emplace_back();
-    offered.effect = effect_from(e, itself);
-    for (const Json& other : e.at("instead")) offered.instead.push_back(effect_from(other, itself));
-  }
-  offer.corrects_file = adoption.at("corrects_file").get<bool>();
-  offer.choice_settles = adoption.at("choice_settles").get<bool>();
-  if (const Json& refusal = adoption.at("refusal"); refusal.is_string())
-    offer.refusal = refusal.get<std::string>();
-  return offer;
-}
-
-// From a diagnosis of a version without `adoption`.
-Offer offer_derived(const Json& diagnosis) {
-  Offer offer;
-  bool alternatives = false;
-  for (const Json& e : diagnosis.at("effects")) {
-    OfferedEffect& offered = offer.effects.emplace_back();
-    offered.effect = effect_from(e, [](const Json& value) -> const Json& { return value.at("value"); });
-    for (const Json& other : e.at("alternatives")) offered.instead.push_back({other.get<std::string>(), {}});
-    alternatives = alternatives || !offered.instead.empty();
-  }
-  const std::string verdict = diagnosis.at("verdict").get<std::string>();
-  if (offer.effects.empty()) {
-    offer.refusal = "no change of the robot file was found";
-  } else if (verdict != name_of(Verdict::effects)) {
-    offer.refusal = "the verdict is " + verdict;
-  } else if (alternatives) {
-    offer.refusal = "some effects are not distinguished from others: name the ones to adopt";
-    offer.choice_settles = true;
-  }
-  return offer;
 }
 
 std::vector<std::string> ids_of(const OfferedEffect& offered) {
@@ -71,7 +30,7 @@ std::vector<std::string> ids_of(const OfferedEffect& offered) {
   return ids;
 }
 
-// The chosen effects; fails where a required choice is missing.
+// The chosen effects.
 Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<std::string>& wanted) {
   std::set<std::string> unused(wanted.begin(), wanted.end());
   std::vector<AdoptedEffect> chosen;
@@ -84,11 +43,6 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
     }
     if (named.size() > 1)
       return invalid("effect", fmt::format("{} are not distinguished: name one of them", enumerate(named)));
-    if (named.empty() && !offered.instead.empty() && offer.choice_settles) {
-      return fail(Fault::conflict, "effect",
-                  fmt::format("{} is not distinguished from {}: name the one to adopt", ids.front(),
-                              enumerate(std::span(ids).subspan(1))));
-    }
     const auto other =
         std::ranges::find(offered.instead, named.empty() ? "" : named.front(), &AdoptedEffect::id);
     chosen.push_back(other == offered.instead.end() ? offered.effect : *other);
@@ -140,8 +94,6 @@ const Table<Offer>& offer_table() {
   static const auto table =
       Table<Offer>()
           .text_or_null("refusal", &Offer::refusal, "reason against adoption; null: can be adopted")
-          .value("choice_settles", &Offer::choice_settles,
-                 "selecting one of each `instead` permits the adoption")
           .value("corrects_file", &Offer::corrects_file,
                  "effects with a parameter in the robot file correct that parameter")
           .list("effects", &Offer::effects, "effects with the parameters to adopt", offered);
@@ -150,7 +102,16 @@ const Table<Offer>& offer_table() {
 
 Result<Offer> offer_from_json(const Json& diagnosis) {
   try {
-    return diagnosis.contains("adoption") ? offer_told(diagnosis["adoption"]) : offer_derived(diagnosis);
+    const Json& adoption = diagnosis.at("adoption");
+    Offer offer;
+    for (const Json& e : adoption.at("effects")) {
+      OfferedEffect& offered = offer.effects.emplace_back(effect_from(e));
+      for (const Json& other : e.at("instead")) offered.instead.push_back(effect_from(other));
+    }
+    offer.corrects_file = adoption.at("corrects_file").get<bool>();
+    if (const Json& refusal = adoption.at("refusal"); refusal.is_string())
+      offer.refusal = refusal.get<std::string>();
+    return offer;
   } catch (const Json::exception&) {
     return fail(Fault::corrupt, "", "the diagnosis does not state what may be adopted");
   }
@@ -158,8 +119,7 @@ Result<Offer> offer_from_json(const Json& diagnosis) {
 
 Result<robot::RobotModel> take(const Offer& offer, const robot::RobotModel& robot, const Choice& choice) {
   if (offer.effects.empty()) return fail(Fault::conflict, "", offer.refusal);
-  if (!offer.refusal.empty() && !offer.choice_settles && !choice.force)
-    return fail(Fault::conflict, "", offer.refusal);
+  if (!offer.refusal.empty() && !choice.force) return fail(Fault::conflict, "", offer.refusal);
   TRY_ASSIGN(const std::vector<AdoptedEffect> chosen, choose(offer, choice.effects));
   return offer.corrects_file ? with_corrections(robot, chosen) : with_effects(robot, chosen);
 }

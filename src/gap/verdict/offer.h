@@ -23,8 +23,6 @@ struct Offer {
   std::vector<OfferedEffect> effects;
   bool corrects_file = false;  // effects that replace a parameter of the file correct it
   std::string refusal;         // why it is not to be taken; empty: it may be
-  // Of diagnoses of earlier versions: a choice among effects that are not distinguished is sufficient.
-  bool choice_settles = false;
 };
 
 // A user's request.
@@ -35,15 +33,13 @@ struct Choice {
 
 Offer offer_of(const Diagnosis& diagnosis);
 
-// `adoption` of a diagnosis's JSON, which offer_from_json() reads from the whole diagnosis. Diagnoses of
-// earlier versions lack it: their offer is derived from verdict, effects and alternatives. Fault::corrupt
-// where there is neither.
+// `adoption` of a diagnosis's JSON, which offer_from_json() reads from the whole diagnosis; Fault::corrupt
+// without it.
 const described::Table<Offer>& offer_table();
 Result<Offer> offer_from_json(const nlohmann::json& diagnosis);
 
 // Returns the robot file with the offered effects, or with those chosen in their place. Fault::conflict with
-// the refusal, which `force` overrides; or, of earlier versions, with the effects between which to choose,
-// which `force` does not override. Fault::invalid of field "effect" for a choice that is not on offer.
+// the refusal, which `force` overrides. Fault::invalid of field "effect" for a choice that is not on offer.
 Result<robot::RobotModel> take(const Offer& offer, const robot::RobotModel& robot, const Choice& choice = {});
 
 }  // namespace joulecast::gap

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "gap/posterior/constants.h"
 #include "gap/verdict/words.h"
 #include "windows/track.h"
 
@@ -46,6 +47,16 @@ std::string follows_words(std::string_view variable) {
   return "follows the " + words_of(variable);
 }
 
+std::string outside_clause(const Outside& o) {
+  const std::string probability = probability_text(o.probability);
+  if (!o.like.empty() && o.power_w[0] != o.power_w[1])
+    return fmt::format(
+        "a load independent of motion (probability {}) follows time or place: from {} W to {} W", probability,
+        brief(o.power_w[0]), brief(o.power_w[1]));
+  return fmt::format("an unknown cause (probability {}) shows in {} and {}", probability,
+                     channel_words(o.channel), follows_words(o.follows));
+}
+
 std::vector<std::string> names_of(const std::vector<std::string>& ids) {
   std::vector<std::string> names;
   for (const std::string& id : ids) names.push_back(words_of(id));
@@ -64,12 +75,16 @@ class Reasons {
       return said_;
     }
     if (d_.verdict == Verdict::none) return said_;
+    if (const double sound = sound_readings(d_.checks); sound < posterior::named)
+      say("{}: see the checks", error_words(sound));
     if (d_.verdict == Verdict::not_this_robot)
       say("the robot file has an error of {} of the power: it belongs to another robot, or to another "
           "state of this one{}",
           percent(d_.power_absolute_relative),
           d_.corrections.empty() ? "" : "; values that fit are proposed below");
-    if (!d_.outside.channel.empty()) said_.push_back(outside_words(d_.outside));
+    if (!d_.outside.channel.empty())
+      said_.push_back(sentence((d_.verdict == Verdict::effects ? "in addition to the effects found, " : "") +
+                               outside_clause(d_.outside)));
     if (worse_than_regression) regression();
     if (d_.verdict != Verdict::effects) shrinkage();
     for (const DiagnosedEffect& e : d_.effects) effect(e);
@@ -155,14 +170,20 @@ class Reasons {
 
 }  // namespace
 
+double sound_readings(std::span<const Check> checks) {
+  double sound = 1;
+  for (const Check& check : checks)
+    if (!check.contradicted && check.probability > 0)
+      sound *= check.factor || check.swapped ? check.probability : 1 - check.probability;
+  return sound;
+}
+
+std::string error_words(double sound) {
+  return fmt::format("an error of the readings has a probability of {}", probability_text(1 - sound));
+}
+
 std::string outside_words(const Outside& o) {
-  const std::string probability = probability_text(o.probability);
-  if (!o.like.empty() && o.power_w[0] != o.power_w[1])
-    return sentence(
-        fmt::format("a load independent of motion (probability {}) follows time or place: from {} W to {} W",
-                    probability, brief(o.power_w[0]), brief(o.power_w[1])));
-  return sentence(fmt::format("an unknown cause (probability {}) shows in {} and {}", probability,
-                              channel_words(o.channel), follows_words(o.follows)));
+  return sentence(outside_clause(o));
 }
 
 std::string earlier_words(const Diagnosis& earlier, std::string_view first_mission) {

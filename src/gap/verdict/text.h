@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -7,6 +8,11 @@
 
 // Sentences of a diagnosis, for the report, the page and the command line alike.
 namespace joulecast::gap {
+
+// The probability that readings have no error as a diagnosis takes them: corrected, or as they are where the
+// checks hold an error for likely; and that of an error, in words.
+double sound_readings(std::span<const Check> checks);
+std::string error_words(double sound);
 
 // The probability of a cause outside the catalogue, where it is visible, the variable it follows and its
 // size, where that is significant.

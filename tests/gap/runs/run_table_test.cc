@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "dynamics/straight.h"
 #include "made_runs.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::gap {
 namespace {

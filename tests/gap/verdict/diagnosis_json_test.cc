@@ -142,7 +142,6 @@ TEST(DiagnosisJson, ContainsEveryField) {
         {{"manoeuvre", "drive slowly"}, {"separates", "c from d"}, {"expected_log_evidence", nullptr}}}},
       {"adoption",
        {{"refusal", nullptr},
-        {"choice_settles", false},
         {"corrects_file", false},
         {"effects",
          {{{"id", "coulomb_friction"}, {"parameters", {{"ratio", 0.41}}}, {"instead", json::array()}}}}}}};

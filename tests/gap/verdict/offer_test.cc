@@ -6,7 +6,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "gap/verdict/answer.h"
 #include "gap/verdict/diagnosis_json.h"
+#include "gap/verdict/text.h"
 #include "robot/robot_file.h"
 #include "tests/gap/verdict/made_diagnosis.h"
 #include "tests/support/sample_robots.h"
@@ -27,14 +29,6 @@ Diagnosis undecided() {
   d.effects[0].alternatives = {"viscous_friction", "turning_scrub"};
   d.effects[0].instead = {{"viscous_friction", {{"ratio", 3.0}}}};
   return d;
-}
-
-// The offer of an earlier version, which left the choice to its reader.
-Offer with_choice(const Diagnosis& d) {
-  Offer offer = offer_of(d);
-  offer.choice_settles = true;
-  offer.refusal = "coulomb_friction is not distinguished from viscous_friction and turning_scrub";
-  return offer;
 }
 
 // Effects of a robot file with their first parameters.
@@ -93,28 +87,14 @@ TEST(Offer, RequiresForceAfterRefusal) {
 
 TEST(Offer, AcceptsEquivalentsWithoutChoice) {
   const Diagnosis d = undecided();
-  EXPECT_FALSE(offer_of(d).choice_settles);
   EXPECT_EQ(taken(d, {}), friction);
   EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
 }
 
-TEST(Offer, RequiresChoiceDespiteForce) {
-  const Offer d = with_choice(undecided());
-  for (const bool force : {false, true}) {
-    const Error error = refused(d, {{}, force});
-    EXPECT_EQ(error.fault, Fault::conflict);
-    EXPECT_THAT(error.message, HasSubstr("viscous_friction and turning_scrub"));
-  }
-  EXPECT_EQ(taken(d, {{"coulomb_friction"}, false}), friction);
-  EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
-}
-
 TEST(Offer, RejectsChoiceWithoutStrength) {
-  const Offer d = with_choice(undecided());
+  const Offer d = offer_of(undecided());
   EXPECT_THAT(refused(d, {{"turning_scrub"}, false}).message, HasSubstr("no strength of turning_scrub"));
   Error error = refused(d, {{"brush_drop"}, false});
-  EXPECT_EQ(error.fault, Fault::conflict);  // the group is still open
-  error = refused(d, {{"brush_drop", "coulomb_friction"}, false});
   EXPECT_EQ(error.fault, Fault::invalid);
   EXPECT_EQ(error.field, "effect");
   EXPECT_THAT(error.message, HasSubstr("brush_drop is not among"));
@@ -141,24 +121,42 @@ TEST(Offer, SurvivesJsonRoundTrip) {
   }
 }
 
-// The JSON of version 1.
-TEST(Offer, ReadsEarlierVersions) {
-  json old = {{"verdict", "effects"},
-              {"effects",
-               {{{"id", "coulomb_friction"},
-                 {"parameters", {{"ratio", {{"value", 0.41}, {"sd", 0.01}, {"unit", "1"}}}}},
-                 {"alternatives", json::array()}}}}};
-  const auto model = take(*offer_from_json(old), joulecast::testing::nomad());
-  ASSERT_TRUE(model) << describe(model.error());
-  EXPECT_EQ(effects_of(*model), friction);
-  old["effects"][0]["alternatives"] = {"viscous_friction"};
-  EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().fault, Fault::conflict);
-  EXPECT_TRUE(take(*offer_from_json(old), joulecast::testing::nomad(), {{"coulomb_friction"}, false}));
-  old["effects"][0]["alternatives"] = json::array();
-  old["verdict"] = "inconclusive";
-  EXPECT_EQ(take(*offer_from_json(old), joulecast::testing::nomad()).error().message,
-            "the verdict is inconclusive");
+TEST(Offer, RejectsDiagnosisWithoutOffer) {
+  json old = json::parse(diagnosis_to_json(made_diagnosis()).dump());
+  old.erase("adoption");
+  EXPECT_EQ(offer_from_json(old).error().fault, Fault::corrupt);
   EXPECT_EQ(offer_from_json(json::object()).error().fault, Fault::corrupt);
+}
+
+// An error of the wheels with a probability of 0.3 is left in the readings, one of the current with 0.9 is
+// corrected.
+TEST(Offer, WeighsCausesByChecks) {
+  Diagnosis d = made_diagnosis();
+  const double before = d.effects[0].probability, group = d.effects[0].group;
+  d.checks.push_back({"wheel_velocity_scale", "wheel_velocity", 2, {1.9, 2.1}, "It may be twice.", false});
+  d.checks.back().probability = 0.3;
+  d.checks.push_back({"battery_current_scale", "battery_current", 10, {9, 11}, "It is ten times.", false});
+  d.checks.back().probability = 0.9;
+  d.checks.back().factor = 10;
+  weigh_by_checks(d);
+  EXPECT_NEAR(d.effects[0].probability, 0.7 * 0.9 * before, 1e-12);
+  EXPECT_NEAR(d.effects[0].group, 0.7 * 0.9 * group, 1e-12);
+  EXPECT_EQ(d.verdict, Verdict::effects);
+  EXPECT_EQ(d.refusal, made_diagnosis().refusal);
+  // A channel that is not used does not matter.
+  d.checks.back().contradicted = true;
+  weigh_by_checks(d);
+  EXPECT_NEAR(d.effects[0].probability, 0.7 * 0.7 * 0.9 * before, 1e-12);
+}
+
+TEST(Offer, RefusesCausesOfLikelyError) {
+  Diagnosis d = made_diagnosis();
+  d.checks.push_back({"wheel_velocity_scale", "wheel_velocity", 2, {1.9, 2.1}, "It may be twice.", false});
+  d.checks.back().probability = 0.6;
+  weigh_by_checks(d);
+  EXPECT_EQ(d.verdict, Verdict::inconclusive);
+  EXPECT_THAT(reasons_for(d, false).front(), HasSubstr("60\u00a0%"));
+  EXPECT_THAT(offer_of(d).refusal, HasSubstr("60\u00a0%"));
 }
 
 }  // namespace

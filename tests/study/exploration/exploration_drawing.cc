@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "report/chart.h"
-#include "report/svg.h"
+#include "report/profile_drawing.h"
+#include "tests/study/exploration/svg.h"
 
 namespace joulecast::report {
 namespace {

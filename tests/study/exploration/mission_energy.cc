@@ -6,9 +6,9 @@
 
 #include "base/bounds.h"
 #include "dynamics/drive_model.h"
-#include "dynamics/straight.h"
 #include "planning/line.h"
 #include "tests/study/ramp/ramp.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::exploration {
 namespace {

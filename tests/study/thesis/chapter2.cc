@@ -3,10 +3,10 @@
 #include <array>
 #include <cmath>
 
-#include "dynamics/straight.h"
 #include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/gaussian_detour.h"
 #include "tests/study/thesis/tables.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::client::thesis {
 namespace {
@@ -34,7 +34,7 @@ Pair straight(const robot::RobotModel& robot, double distance_m, double duration
     wheels += dynamics::wheel_power(m.resistance_ohm / (torque_constant * torque_constant),
                                     m.voltage_constant_v_s_rad / m.torque_constant_nm_a,
                                     m.rotor_inertia_kg_m2, m.viscous_friction_nm_s_rad, friction_nm);
-  task.power = wheels.rescaled(robot.kinematics.wheel_radius_m);
+  task.power = rescaled(wheels, robot.kinematics.wheel_radius_m);
   pair.motor_j = energy();
   return pair;
 }

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
-#include "dynamics/straight.h"
 #include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/tables.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::client::thesis {
 namespace {
@@ -43,7 +43,7 @@ Table table_3_3(const robot::RobotModel& nomad) {
     // left.
     for (const bool left : {true, false}) {
       const std::size_t side = left ? robot::right : robot::left;
-      const auto along = power.side[side].rescaled(power.wheel_radius_m);
+      const auto along = rescaled(power.side[side], power.wheel_radius_m);
       const double ours = run(along, p.acceleration_m_s2, path_distance_m).energy_j();
       const double value = left ? p.left_j : p.right_j;
       const double cruise_j_m = along.power_w(4 * p.acceleration_m_s2, 0) / (4 * p.acceleration_m_s2);

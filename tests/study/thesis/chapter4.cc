@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-#include "dynamics/straight.h"
 #include "planning/line.h"
 #include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/tables.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::client::thesis {
 namespace {

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "client/virtual_robot/fleet.h"
-#include "dynamics/straight.h"
 #include "robot/robot_file.h"
 #include "tests/study/exploration/explore.h"
 #include "tests/study/exploration/mission_energy.h"
 #include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/tables.h"
+#include "tests/support/straight_power.h"
 
 namespace joulecast::client::thesis {
 namespace {

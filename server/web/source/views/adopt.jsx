@@ -59,7 +59,7 @@ function Messages({ job, state, refusal, refused }) {
 export function Adopt({ job }) {
   const offer = job.result.adoption;
   const groups = offer?.effects.filter((e) => e.instead.length > 0) ?? [];
-  const refusal = offer && !offer.choice_settles ? offer.refusal : null;
+  const refusal = offer?.refusal ?? null;
   const [chosen, setChosen] = useState({});
   const effect = groups.map((g) => chosen[g.id] ?? '');
   const robot = useGet(`/v1/robots/${idPath(job.robot_id)}`);

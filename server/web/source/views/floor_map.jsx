@@ -86,7 +86,7 @@ function Marked({ cell, side }) {
     ['Square', square(cell, side)],
     ['Consumption', consumption(cell.energy_j_per_m)],
     ['Departure (95 %)', departure(cell)],
-    ['Ratio', format.fixed(cell.ratio, 3)],
+    ['Ratio', format.fixed(cell.ratio, 3), 'while driving'],
     ['Time', format.span(cell.covered_s)],
     ['Missions', `${cell.missions}`, `of ${format.count(cell.robots, 'robot')}`],
   ];
@@ -169,7 +169,7 @@ function Summary({ map }) {
     ['Energy', energy(map.energy_j), worthTexts(tariff, map.energy_j).join(', '), 'measured'],
     ['Distance', format.length(map.distance_m)],
     ['Consumption', consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)],
-    ['Ratio', format.fixed(map.ratio, 3)],
+    ['Ratio', format.fixed(map.ratio, 3), 'while driving'],
     [
       'Missions',
       format.fixed(map.missions_read),

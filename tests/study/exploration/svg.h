@@ -6,15 +6,13 @@
 
 namespace joulecast::report {
 
-// Style of a shape. With `css`, a class of the style sheet around it determines the colours, and none are
-// written.
+// Style of a shape.
 struct SvgStyle {
   std::string_view fill = "none";
   std::string_view stroke = "none";
   double width = 1;
   std::string_view dash = "";
   double opacity = 1;
-  std::string_view css = "";
 };
 
 struct SvgPoint {
@@ -29,21 +27,17 @@ struct SvgText {
   std::string_view fill = "#222";
   SvgAnchor anchor = SvgAnchor::start;
   bool bold = false;
-  std::string_view halo = "";  // colour painted round the letters
-  std::string_view css = "";   // a class in the place of size, colour and anchor
-  bool upwards = false;        // turned by 90 degrees to the left
 };
 
 // Builds one SVG 1.1 picture; coordinates are pixels, y down. Every text is escaped.
 class Svg {
  public:
-  // A document of its own on white, with `style_sheet` for the classes that it uses.
-  static Svg document(double width, double height, std::string_view title, std::string_view style_sheet = "");
+  // A document of its own on white.
+  static Svg document(double width, double height, std::string_view title);
 
   void rect(double x, double y, double width, double height, const SvgStyle& style, double corner = 0);
   void circle(SvgPoint center, double radius, const SvgStyle& style);
   void line(SvgPoint from, SvgPoint to, const SvgStyle& style);
-  void polyline(std::span<const SvgPoint> points, const SvgStyle& style);
   void polygon(std::span<const SvgPoint> points, const SvgStyle& style);
   void text(SvgPoint at, std::string_view words, const SvgText& style = {});
   // Elements until end_clip() are painted only inside the rectangle.

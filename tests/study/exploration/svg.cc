@@ -1,10 +1,8 @@
-#include "report/svg.h"
+#include "tests/study/exploration/svg.h"
 
 #include <fmt/format.h>
 
 #include <iterator>
-
-#include "base/xml_text.h"
 
 namespace joulecast::report {
 namespace {
@@ -17,14 +15,37 @@ std::string px(double value) {
   return text == "-0" ? "0" : text;
 }
 
+// As content or attribute value; control characters that are not XML are left out.
+std::string xml_escaped(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') out += c;
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
-Svg Svg::document(double width, double height, std::string_view title, std::string_view style_sheet) {
+Svg Svg::document(double width, double height, std::string_view title) {
   std::string head = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
       "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n<title>{2}</title>\n",
       px(width), px(height), xml_escaped(title));
-  if (!style_sheet.empty()) head += fmt::format("<style>{}</style>\n", style_sheet);
   Svg svg(std::move(head));
   svg.rect(0, 0, width, height, {.fill = "#fff"});
   return svg;
@@ -36,16 +57,12 @@ void Svg::attribute(std::string_view name, double pixels) {
 
 void Svg::finish(const SvgStyle& style) {
   auto out = std::back_inserter(body_);
-  if (!style.css.empty()) {
-    fmt::format_to(out, " class=\"{}\"", style.css);
-  } else {
-    fmt::format_to(out, " fill=\"{}\"", xml_escaped(style.fill));
-    if (style.stroke != "none")
-      fmt::format_to(out, " stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"",
-                     xml_escaped(style.stroke), px(style.width));
-    if (!style.dash.empty()) fmt::format_to(out, " stroke-dasharray=\"{}\"", xml_escaped(style.dash));
-    if (style.opacity < 1) attribute("opacity", style.opacity);
-  }
+  fmt::format_to(out, " fill=\"{}\"", xml_escaped(style.fill));
+  if (style.stroke != "none")
+    fmt::format_to(out, " stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"",
+                   xml_escaped(style.stroke), px(style.width));
+  if (!style.dash.empty()) fmt::format_to(out, " stroke-dasharray=\"{}\"", xml_escaped(style.dash));
+  if (style.opacity < 1) attribute("opacity", style.opacity);
   body_ += "/>\n";
 }
 
@@ -76,10 +93,6 @@ void Svg::line(SvgPoint from, SvgPoint to, const SvgStyle& s) {
   finish(s);
 }
 
-void Svg::polyline(std::span<const SvgPoint> p, const SvgStyle& s) {
-  points("polyline", p, s);
-}
-
 void Svg::polygon(std::span<const SvgPoint> p, const SvgStyle& s) {
   points("polygon", p, s);
 }
@@ -88,19 +101,11 @@ void Svg::text(SvgPoint at, std::string_view words, const SvgText& s) {
   static constexpr std::string_view anchors[] = {"start", "middle", "end"};
   auto out = std::back_inserter(body_);
   body_ += "<text";
-  if (!s.css.empty()) fmt::format_to(out, " class=\"{}\"", s.css);
-  if (s.upwards)
-    fmt::format_to(out, " transform=\"translate({} {}) rotate(-90)\"", px(at.x), px(at.y));
-  else
-    attribute("x", at.x), attribute("y", at.y);
-  if (s.css.empty()) {
-    fmt::format_to(out, " font-size=\"{}\" fill=\"{}\"", px(s.size), xml_escaped(s.fill));
-    if (s.anchor != SvgAnchor::start)
-      fmt::format_to(out, " text-anchor=\"{}\"", anchors[static_cast<std::size_t>(s.anchor)]);
-    if (s.bold) body_ += " font-weight=\"bold\"";
-    if (!s.halo.empty())
-      fmt::format_to(out, " stroke=\"{}\" stroke-width=\"3\" paint-order=\"stroke\"", xml_escaped(s.halo));
-  }
+  attribute("x", at.x), attribute("y", at.y);
+  fmt::format_to(out, " font-size=\"{}\" fill=\"{}\"", px(s.size), xml_escaped(s.fill));
+  if (s.anchor != SvgAnchor::start)
+    fmt::format_to(out, " text-anchor=\"{}\"", anchors[static_cast<std::size_t>(s.anchor)]);
+  if (s.bold) body_ += " font-weight=\"bold\"";
   fmt::format_to(out, ">{}</text>\n", xml_escaped(words));
 }
 
