@@ -152,13 +152,15 @@ bool never_negative(const ValueTally& t) {
   return !t.constant() && t.low() >= -noise_share * t.high();
 }
 
-// Detects a battery's current without a sign: a battery that is charged has a higher voltage.
+// Detects a battery's current without a sign: a battery that is charged has a higher voltage, by as much as
+// discharging lowers it. A smaller rise has another cause.
 void check_unsigned_battery(const CheckContext& c, Checks& checks) {
   if (!never_negative(c.tally(reading::battery_current))) return;
   const BlockFit fit = fit_blocks(c.blocks(Relation::sag), 0, {1, 2});
   const Estimate driving = estimate(fit, 0), braking = estimate(fit, Eigen::Vector2d(1, 1));
   if (!driving.sure() || driving.value > 0 || !braking.sure() || braking.value < 0) return;
   const Estimate ratio = braking * (-1 / driving.value);
+  if (ratio.interval()[1] < 1) return;
   add_check(checks, "battery_current_unsigned", "battery_current", ratio, true,
             "battery_current is never negative, and while the motors brake the battery's voltage rises with "
             "it, {} times as much as it falls otherwise: its sign is lost; joulecast expects it positive "
