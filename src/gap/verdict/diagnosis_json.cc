@@ -44,8 +44,7 @@ const Table<Check>& check_table() {
                  "by which the channel is divided for the diagnosis: -1 for a reversed sign")
           .value("probability", &Check::probability,
                  "of a wrong sign, unit or side, against every other explanation; of a channel that is used "
-                 "as it "
-                 "is, of any error of the readings")
+                 "as it is, of any error of the readings")
           .only([](const Check& check) { return check.probability > 0; })
           .known("first_mission", &Check::first_mission,
                  "of a step between missions: index of the first one after it")
