@@ -50,11 +50,15 @@ struct WheelLoad {
 };
 using WheelLoads = std::array<WheelLoad, 2>;
 
-// Motors that take less coast. A cell within which one turns into a generator is integrated in so many parts,
-// for the rate of losses changes there: the error falls with their square, from 2e-3 of a braking motion's
-// energy.
-inline constexpr double coasting_w = 1e-6;
-inline constexpr int parts_of_turn = 16;
+// Parts in which a cell is integrated where a motor turns into a generator, or back, for the rate of losses
+// changes there. The error falls with their square, from 2e-3 of a braking motion's energy, and is the
+// smaller the less power the motor takes or gives at one end.
+inline int parts_of_turn(double from_w, double to_w, double idle_w) {
+  if ((from_w > 0) == (to_w > 0)) return 1;
+  const double from = std::fabs(from_w), to = std::fabs(to_w);
+  return std::max(1,
+                  static_cast<int>(std::ceil(32 * std::sqrt(2 * std::min(from, to) / (idle_w + from + to)))));
+}
 
 // Electrical constants of the drive. P = copper T^2 + back_emf w T + brush |T| for each motor; the battery
 // gives idle + sum of (up P where P > 0, down P where P < 0).

@@ -427,8 +427,12 @@ class Writer {
       const double span = times[k + 1] - times[k];
       const State next = at(k, 1.0);
       int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
-      if (loads_.electric().up != loads_.electric().down && turns(here, flow(planner, next)))
-        parts = std::max(parts, parts_of_turn);
+      if (const Electric& e = loads_.electric(); e.up != e.down) {
+        const dynamics::PowerFlow<double> there = flow(planner, next);
+        for (const std::size_t side : {0u, 1u})
+          parts =
+              std::max(parts, parts_of_turn(here.motor_power_w[side], there.motor_power_w[side], e.idle_w));
+      }
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
           add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
@@ -454,13 +458,6 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
-  // Whether a motor turns into a generator in between, or back.
-  static bool turns(const dynamics::PowerFlow<double>& a, const dynamics::PowerFlow<double>& b) {
-    const auto drives = [](double power_w) { return power_w > coasting_w; };
-    return drives(a.motor_power_w[0]) != drives(b.motor_power_w[0]) ||
-           drives(a.motor_power_w[1]) != drives(b.motor_power_w[1]);
-  }
-
   int parts_of(const Run& run, const State& from, double to_speed) const {
     return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
   }

@@ -81,11 +81,6 @@ class Logarithms {
   double product_ = 1, sum_ = 0;
 };
 
-// Shortens a step so that a positive value keeps its share: N&W (19.9).
-void shorten(double value, double change, double& step) {
-  if (change < 0 && -change * step > to_boundary * value) step = to_boundary * value / -change;
-}
-
 }  // namespace
 
 SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_profile(grid_)) {
@@ -560,15 +555,14 @@ double SpeedSolver::stationarity_residual() const {
   return worst;
 }
 
-// Longest step that keeps a share of every bound's slack, the motors' linearised.
+// Longest step that keeps a share of every bound's slack, the motors' linearised: N&W (19.9).
 double SpeedSolver::step_to_boundary() const {
-  double longest = 1;
+  double used = to_boundary;  // the largest share of a slack by the whole step
   for (std::size_t k = 0; k < grid_.cells(); ++k)
-    for (const BoundState& b : bounds_of(k)) {
-      const double room = b.index < of_motors ? b.slack : linear_share * b.slack;
-      shorten(room, -b.change(step_[k], step_[k + 1]), longest);
-    }
-  return longest;
+    for (const BoundState& b : bounds_of(k))
+      used = std::max(
+          used, b.change(step_[k], step_[k + 1]) / (b.slack * (b.index < of_motors ? 1 : linear_share)));
+  return to_boundary / used;
 }
 
 double SpeedSolver::decrement() const {
