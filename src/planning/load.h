@@ -82,8 +82,7 @@ class DriveLoads {
   const dynamics::DriveModel& model() const { return model_; }
   const Electric& electric() const { return electric_; }
 
-  // Loads at a way of the run where the curvature changes by `curvature_slope` per metre.
-  WheelLoads at(const Run& run, const Knot& knot, double curvature_slope) const;
+  WheelLoads at(const Run& run, const Place& place) const;
 
   // Whether the moment of scrub builds up with the yaw rate.
   bool scrubs() const { return scrub_rate_rad_s_ > 0; }
@@ -91,9 +90,7 @@ class DriveLoads {
   // Whether the loads are the same all along the run.
   bool uniform(const Run& run) const;
 
-  // Motion at a knot of a run.
-  dynamics::Instant instant(const Run& run, const Knot& knot, double curvature_slope, double speed,
-                            double acceleration) const;
+  dynamics::Instant instant(const Run& run, const Place& place, double speed, double acceleration) const;
 
  private:
   explicit DriveLoads(dynamics::DriveModel model) : model_(std::move(model)) {}

@@ -414,7 +414,7 @@ class Writer {
     const Run& run = planner.run();
     uniform_ = loads_.uniform(run);
     if (uniform_) {
-      here_ = loads_.instant(run, run.at(0), 0, 1, 1);
+      here_ = loads_.instant(run, run.at(0), 1, 1);
       pace_ = here_.wheel_speed_rad_s;
     }
     if (rows_) reserve(plan_.profile.size() + times.size());
@@ -459,7 +459,7 @@ class Writer {
 
  private:
   int parts_of(const Run& run, const State& from, double to_speed) const {
-    return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
+    return loads_.at(run, run.at(from.way))[0].parts(from.speed, to_speed);
   }
 
   // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
@@ -473,14 +473,11 @@ class Writer {
       return loads_.model().flow(here_);
     }
     const Run& run = planner.run();
-    const double slope = run.turn == 0 ? slope_at(run, s.way) : 0;
-    return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
+    return loads_.model().flow(loads_.instant(run, just_after(run, s.way), s.speed, s.acceleration));
   }
 
-  // Just after a place, as in the rows.
-  static double slope_at(const Run& run, double way) {
-    return run.curvature_slope(way + 1e-9 * run.length());
-  }
+  // As in the rows: the curvature's slope jumps at knots.
+  static Place just_after(const Run& run, double way) { return run.at(way + 1e-9 * run.length()); }
 
   void add(const dynamics::PowerFlow<double>& f, double seconds) {
     using signals::Term;
@@ -508,8 +505,8 @@ class Writer {
            power);
     } else {
       push(time_s, driven_m_ + s.way, knot.pose, s.speed, knot.curvature_1_m * s.speed, s.acceleration,
-           knot.curvature_1_m * s.acceleration + slope_at(run, s.way) * s.speed * s.speed, run.payload_kg,
-           power);
+           knot.curvature_1_m * s.acceleration + just_after(run, s.way).curvature_slope * s.speed * s.speed,
+           run.payload_kg, power);
     }
   }
 

@@ -328,7 +328,7 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
 
 // Gradient and tridiagonal Hessian of the Lagrangian with the bounds condensed, at z_.
 void SpeedSolver::assemble(double mu) {
-  cost_here_ = kink_gap_ = 0;
+  cost_here_ = kink_gap_ = products_ = 0;
   Logarithms logs;
   const std::size_t n = grid_.cells();
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
@@ -368,6 +368,7 @@ void SpeedSolver::assemble(double mu) {
                  gradient_[k] += push * g0, gradient_[k + 1] += push * g1;
                  stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
                });
+    for (const BoundState& b : bounds_of(k)) products_ += b.multiplier * b.slack;
     diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
     off_[k] += d01;
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
@@ -524,13 +525,6 @@ bool SpeedSolver::regularise(double damping, bool& corrected) {
     if (add > 1e12) return false;
   }
   return true;
-}
-
-// Sum of multipliers times slacks.
-double SpeedSolver::complementarity() const {
-  double gap = 0;
-  for (const BoundState& b : bound_states_) gap += b.multiplier * b.slack;
-  return gap;
 }
 
 std::vector<double> SpeedSolver::cost_of_ends() const {
@@ -727,7 +721,7 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     solve_step(slope_, step_);
     const double late_s = due ? follow_price(due->duration_s) : 0;
     if (due && idle_ > grid_.electric.idle_w + due->most_w) break;
-    const double left = complementarity(), allowed = tolerance * barrier.scale();
+    const double left = products_, allowed = tolerance * barrier.scale();
     solution.residual = stationarity_residual() / barrier.scale();
     if (barrier.at_finest() && left < 3 * allowed && decrement() < 0.3 * allowed &&
         !(due && std::fabs(late_s) > tolerance * due->duration_s) &&
