@@ -54,15 +54,15 @@ struct Correction {
   double variance_j2(const Features& x) const;
 };
 
-// The prior of an unmeasured robot, of departures from the model that 200 robots of an independent plant and
+// The prior of an unmeasured robot, by departures from the model that 200 robots of an independent plant and
 // 24 virtual ones have learned after 30 missions. Their root mean squares are, of energies: standing 0.20 and
 // 0.19, driving 0.43 and 0.48, turning 1.58 and 1.28, payload 0.23 and 0.33, speed 0.12 and 0.33. The
-// deviations have these, with equal weights of both, times sqrt(3/5), as a t distribution of 5 degrees of
-// freedom exceeds its scale; payload's are not reduced, as first payloads are forecast without evidence
-// (reduced, intervals of two times 20 kinds covered 90 and 82 %). Driving is correlated with turning by 0.87
-// and 0.76, with payload by 0.76 and 0.31, turning with payload by 0.70 and 0.26: 0.7 and its square stand
-// for all. Of durations: driving 0.04, turning 0.03, speed 0.04 and payload at most 0.01, and 0.05 s
-// (recorded robots 0.12) by which a motion lasts into a halt.
+// deviations are these, with equal weights of both, times sqrt(3/5), as a t distribution of 5 degrees of
+// freedom exceeds its scale; not so payload's, as first payloads are forecast without evidence (times
+// sqrt(3/5), their intervals cover 90 and 82 %). Correlations of driving and turning are 0.87 and 0.76, of
+// driving and payload 0.76 and 0.31, of turning and payload 0.70 and 0.26: 0.7, its square for the last. Of
+// stated durations, of the 100 that follow plans inexactly: driving 0.072, turning 0.056, speed 0.052,
+// likewise times sqrt(3/5), payload at most 0.01; a motion outlasts its command by 0.05 to 0.12 s.
 Correction untried(Subject subject);
 
 // Each factor's prior is a t distribution of 5 degrees of freedom, which far evidence overrules: a normal one

@@ -79,11 +79,10 @@ class Forecaster {
 // Learns from the missions of one robot as they end, against its model in force. Each mission is first
 // predicted from the missions before it; its score then calibrates the intervals (prequential split
 // conformal). The scores of a robot with few missions are those of another forecast than the one in force:
-// they are biased and have another width. Each time that a quarter of the kept missions is new, all that is
-// learned is therefore estimated from the kept ones again, and each is scored by the others (jackknife+,
-// Barber, Candes, Ramdas and Tibshirani 2021). The hit or miss of the 90 % interval adapts their width (Gibbs
-// and Candes 2021, on the logarithm of the width). Missions before the robot's last change (drift/marks.h)
-// are set aside.
+// they are biased and have another width. Each time that a quarter of the kept missions is new, all is
+// estimated from the kept ones again, each scored by the others (jackknife+, Barber, Candes, Ramdas and
+// Tibshirani 2021). The hit or miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the
+// logarithm of the width). Missions before the robot's last change (drift/marks.h) are set aside.
 class RobotForecast {
  public:
   static constexpr std::size_t most_missions = 120;  // kept to learn again when the model changes
@@ -129,7 +128,6 @@ class RobotForecast {
     double halted = 0;    // measured while standing, where halts are not foreseen one by one
     PlanSum sum;          // of the foreseen
 
-    Prediction predicted(Subject subject, const Forecaster& by) const;
     double score(Subject subject, const Forecaster& by) const;
   };
 
