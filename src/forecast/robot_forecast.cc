@@ -237,7 +237,7 @@ Forecaster::Track RobotForecast::track(Subject subject) const {
   t.correction = learning.fit.posterior(siblings.prior);
   t.scatter = scattered.legs;
   t.common = scattered.common;
-  // A command's end is known to a sample period: the scores of legs do not narrow the durations of plans.
+  // Samples show the end of a command to a period: the scores of legs do not narrow the durations of plans.
   if (subject == Subject::stated_duration) return t;
   t.scores = pooled_scores(learning.scores, siblings.scores);
   t.inflation = std::exp(learning.log_inflation);
