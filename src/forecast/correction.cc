@@ -58,7 +58,7 @@ double Correction::variance_j2(const Features& x) const {
 
 Correction untried(Subject subject) {
   Correction prior;
-  constexpr Features energies{0.155, 0.35, 1.1, 0.29, 0.19}, durations{0.1, 0.055, 0.045, 0.01, 0.04};
+  constexpr Features energies{0.155, 0.33, 1.1, 0.29, 0.19}, durations{0.1, 0.055, 0.045, 0.01, 0.04};
   const Features& deviation = is_duration(subject) ? durations : energies;
   if (is_duration(subject)) prior.mean[0] = 0;
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
