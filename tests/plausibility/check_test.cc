@@ -236,6 +236,13 @@ TEST(CheckRecordings, MeasuresHeldReadings) {
   }
 }
 
+// Speeds of few levels repeat from row to row without being held.
+TEST(CheckRecordings, CoarseSpeedsAreNotHeld) {
+  telemetry::RecordingSet set = scout().recordings;
+  alter::round_to(set, {reading::wheel_velocity, reading::wheel_velocity + 1}, 0.3);
+  EXPECT_FALSE(find(check_recordings(set, scout().model), "held_samples"));
+}
+
 TEST(CheckRecordings, ReportsMostlyMissingChannel) {
   telemetry::RecordingSet set = scout().recordings;
   for (auto& mission : set.missions) {
