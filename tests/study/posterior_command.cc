@@ -100,11 +100,6 @@ ordered_json to_json(const gap::posterior::Explained& a) {
           {"detectable", number(a.detectable)},
           {"repeats", {{"file", number(a.repeats_file)}, {"left", number(a.repeats_left)}}},
           {"tolerance_factors", a.factors},
-          {"log_evidence", a.log_evidence},
-          {"rows", a.rows},
-          {"blocks", a.blocks},
-          {"models", a.models},
-          {"steps", a.steps},
           {"reasons", a.reasons}};
 }
 

@@ -39,9 +39,6 @@ struct Explained {
   std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
   Eigen::VectorXd explained_w;  // by row of power, by the model and the causes that follow covariates
   bool adopts = false;          // the model reduces the held-out error
-  std::size_t models = 0, rows = 0, blocks = 0;
-  int steps = 0;
-  double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
 
 // The answer at the point that the walk reached, with the effects that other witnesses name.

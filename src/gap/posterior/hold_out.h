@@ -31,6 +31,8 @@ struct HeldOut {
 
 // 95 % interval of the part of the file's error that the explanation removes; NaN of fewer than two blocks.
 std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks);
+// Part of the resamples of the blocks in which the explanation has a smaller error than the file.
+double chance_of_benefit(std::span<const HeldOut::Block> blocks);
 
 // Returns the power of the linear regression by row, fitted to blocks with a weight.
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
