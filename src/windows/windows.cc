@@ -100,12 +100,10 @@ Window window_at(const Track& c, const Place& at) {
   }
   for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = kernel.mean(c.motion[q]);
   w.battery_voltage_v = kernel.mean(c.battery_voltage);
-  w.battery_voltage_step_v = c.battery_voltage_step_v;
   w.mission_voltage_v = c.mean_battery_voltage_v;
   w.battery_current_a = kernel.mean(c.battery_current);
   w.battery_power_w = kernel.mean(c.battery_power);
   w.battery_power_slope_w_s = kernel.slope(c.battery_power);
-  w.battery_current_slope_a_s = kernel.slope(c.battery_current);
   w.charge_as = kernel.mean(c.charge);
   w.yaw_rate_rad_s = kernel.mean(c.yaw_rate);
   w.climb_rad = kernel.mean(c.climb);
@@ -118,7 +116,7 @@ Window window_at(const Track& c, const Place& at) {
 
 void forget_battery(Window& w) {
   w.battery_voltage_v = w.battery_current_a = w.battery_power_w = missing;
-  w.battery_power_slope_w_s = w.battery_current_slope_a_s = 0;
+  w.battery_power_slope_w_s = 0;
 }
 
 void forget_motors(Window& w) {
@@ -131,7 +129,7 @@ void read_battery(const Track& c, std::size_t row, Window& w) {
   w.battery_voltage_v = c.battery_voltage[row];
   w.battery_current_a = c.battery_current[row];
   w.battery_power_w = c.battery_power[row];
-  w.battery_power_slope_w_s = w.battery_current_slope_a_s = 0;
+  w.battery_power_slope_w_s = 0;
 }
 
 void read_motors(const Track& c, std::size_t row, Window& w) {
@@ -196,11 +194,7 @@ std::optional<Window> power_row(const Track& c, std::span<const std::size_t> row
   w.battery_voltage_v = mean(c.battery_voltage);
   w.battery_current_a = mean(c.battery_current);
   w.battery_power_w = mean(c.battery_power);
-  if (slopes) {
-    w.battery_power_slope_w_s = line_at(c.time_s, c.battery_power, w.t_s, half_s).slope;
-    w.battery_current_slope_a_s = line_at(c.time_s, c.battery_current, w.t_s, half_s).slope;
-  }
-  w.battery_voltage_step_v = c.battery_voltage_step_v;
+  if (slopes) w.battery_power_slope_w_s = line_at(c.time_s, c.battery_power, w.t_s, half_s).slope;
   w.mission_voltage_v = c.mean_battery_voltage_v;
   w.charge_as = mean(c.charge);
   w.payload_kg = mean(c.payload);
