@@ -250,15 +250,7 @@ void print_runs(const Json& d) {
   fmt::print("modelled energies from {}; the runs scatter by {:.1f} % in addition to any cause\n",
              member_at(d, "model/given") == true ? "the table" : "the robot file",
              percent_at(d, "scatter/run"));
-  if (!d["left_out_conditions"].empty())
-    fmt::print("mean error of the runs of one condition when all of them are held out:\n");
-  for (const Json& l : d["left_out_conditions"])
-    fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (linear regression {:.1f} %), effects:{}\n",
-               text(l["left_out"]), l["runs"].get<std::size_t>(), percent_at(l, "held_out_before"),
-               percent_at(l, "held_out_after"), percent_at(l, "baseline_held_out"), names_in(l["effects"]));
   print_limits(d);
-  if (!d["not_visible"].empty())
-    fmt::print("  - Not detectable in these runs:{}\n", names_in(d["not_visible"]));
 }
 
 std::string per_way(const Json& joules_per_m, const std::string& unit) {

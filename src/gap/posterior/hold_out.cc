@@ -291,17 +291,6 @@ Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights) 
   return predictors(fit, weights, {}, false).effects.head(ix(fit.equations.effects));
 }
 
-Without predict_without(const Fit& fit, std::span<const double> weights) {
-  const Predictors p = predictors(fit, weights, {}, true);
-  const Eigen::VectorXd probability =
-      probabilities(*fit.prior, reduce(fit.equations, fit.grams, weights), fit.models).model;
-  Without out{explained_power(fit, p, weights), plain_regression(fit.data, weights), {}};
-  for (const Found& found : summarise(fit, probability).effects) {
-    if (found.group >= named) out.named.push_back(found.id);
-  }
-  return out;
-}
-
 double repeated_part(const Data& d, const Eigen::VectorXd& residual_w) {
   struct Mean {
     double sum = 0, count = 0;

@@ -38,15 +38,6 @@ Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weigh
 // Strengths of the effects with the calibration, averaged over the models without a function.
 Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights);
 
-// Predictions of the posterior without some blocks, for all rows of power.
-struct Without {
-  Eigen::VectorXd explanation_w;   // by effects and calibration
-  Eigen::VectorXd regression_w;    // by the linear regression
-  std::vector<std::string> named;  // ids
-};
-// `weights` of each block; 0: left out.
-Without predict_without(const Fit& fit, std::span<const double> weights);
-
 // `with_functions` false: given that no function is present.
 HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,
                  bool with_functions = true);
