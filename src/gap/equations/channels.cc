@@ -96,12 +96,6 @@ std::string_view name_of(Channel channel) {
   return "";
 }
 
-FromMotion from_motion_of(const windows::Readings& readings) {
-  FromMotion from_motion{!readings.motor_currents, !readings.motor_currents && readings.motor_voltages};
-  from_motion.kinematics = !from_motion.alone() || !readings.battery_power;
-  return from_motion;
-}
-
 template <class S>
 MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const auto& p = model.parameters();
@@ -188,7 +182,6 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
       p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /
           (S(1) + p.battery_current.gain);
-  if (!from_motion.kinematics) return r;
   r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - yaw_rate_rad_s;
   const S grip = S(1) - p.slip;
   const S right = p.wheel_radius_m[0] * grip * w.span_angle_rad[0],

@@ -45,13 +45,8 @@ using ChannelValues = std::array<S, channel_count>;
 struct FromMotion {
   bool power = false;    // Channel::power is used; it costs as much as the others together
   bool voltage = false;  // Channel::drive_right and drive_left are used
-  // The gyro and the map are equations; with battery power alone, checks compare them instead.
-  bool kinematics = true;
   bool alone() const { return power && !voltage; }
 };
-
-// How recordings with these readings are evaluated.
-FromMotion from_motion_of(const windows::Readings& readings);
 
 // Residuals of one window. Value NaN: the channel is unavailable here.
 template <class S>

@@ -34,46 +34,4 @@ std::vector<double> measured_power(std::span<const Window> windows, const robot:
   return power;
 }
 
-std::vector<double> modelled_power(const robot::RobotModel& robot,
-                                   std::span<const dynamics::ActiveEffect> adopted,
-                                   std::span<const Cause> causes, std::span<const Window> windows) {
-  std::vector<dynamics::ActiveEffect> effects(adopted.begin(), adopted.end());
-  for (const Cause& cause : causes) {
-    if (!cause.by) effects.push_back(cause.effect);
-  }
-  const std::size_t steady = effects.size();
-  std::vector<double> power(windows.size());
-  std::optional<dynamics::DriveModel> model;
-  for (std::size_t k = 0; k < windows.size(); ++k) {
-    if (steady - adopted.size() < causes.size()) {
-      effects.resize(steady);
-      for (const Cause& cause : causes) {
-        if (!cause.by) continue;
-        effects.push_back(cause.effect);
-        effects.back().values[cause.parameter] *= cause.by->of(windows[k]);
-      }
-      model.reset();
-    }
-    if (!model) model.emplace(robot, effects);
-    power[k] = metered_powers(*model, windows[k]).battery_w;
-  }
-  return power;
-}
-
-GapSize gap_size(std::span<const double> measured_w, std::span<const double> modelled_w) {
-  double difference = 0, absolute = 0, total = 0, size = 0;
-  for (std::size_t k = 0; k < measured_w.size(); ++k) {
-    const double e = measured_w[k] - modelled_w[k];
-    if (!std::isfinite(e)) continue;
-    difference += e;
-    absolute += std::fabs(e);
-    total += measured_w[k];
-    size += std::fabs(measured_w[k]);
-  }
-  GapSize gap;
-  gap.energy_relative = total != 0 ? difference / total : 0;
-  gap.absolute_relative = size > 0 ? absolute / size : 0;
-  return gap;
-}
-
 }  // namespace joulecast::gap

@@ -3,7 +3,6 @@
 #include <span>
 #include <vector>
 
-#include "gap/equations/cause.h"
 #include "gap/equations/channels.h"
 
 namespace joulecast::gap {
@@ -23,18 +22,5 @@ double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_
 // and the idle power of the robot file in its place.
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors);
-
-// Returns the battery power by the robot file with its own effects (`adopted`) and these causes in force, as
-// the robot's meter would read it.
-std::vector<double> modelled_power(const robot::RobotModel& robot,
-                                   std::span<const dynamics::ActiveEffect> adopted,
-                                   std::span<const Cause> causes, std::span<const Window> windows);
-
-struct GapSize {
-  double energy_relative = 0;    // (E_measured - E_model) / E_measured
-  double absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|
-};
-
-GapSize gap_size(std::span<const double> measured_w, std::span<const double> modelled_w);
 
 }  // namespace joulecast::gap

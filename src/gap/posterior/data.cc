@@ -50,6 +50,7 @@ void add_readings(const windows::Track& c, double period_s, double voltage_v, st
   const auto row_of = [&](std::size_t n) {
     return length_s > 0 ? std::floor(c.time_s[at[n]] / length_s) : static_cast<double>(n);
   };
+  double last_s = 0;
   for (std::size_t n = 0; n < at.size();) {
     std::size_t end = n;
     double sum = 0;
@@ -60,6 +61,9 @@ void add_readings(const windows::Track& c, double period_s, double voltage_v, st
       rows.instants.back().mission = mission;
       rows.instants.back().battery_voltage_v = voltage_v;
     }
+    Window& row = rows.instants[rows.first.back()];
+    row.continues = n > 0 && row.t_s - last_s < 2 * std::max(length_s, fresh.period_s);
+    last_s = row.t_s;
     rows.first.push_back(rows.instants.size());
     rows.power_w.push_back(sum / static_cast<double>(count));
     n = end;
@@ -122,7 +126,9 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.windows = windows::make_windows(missions, robot, readings,
                                     {.electrical_delay_s = electrical_delay_s, .most_windows = most_windows});
   keep_known_motion(d.windows);
-  if (d.windows.size() < fewest_windows) return fail(Fault::invalid, "", "too little known motion");
+  const auto whole = [](const Window& w) { return w.reading || windows::steady(w); };
+  if (static_cast<std::size_t>(std::ranges::count_if(d.windows, whole)) < fewest_windows)
+    return fail(Fault::invalid, "", "too little known motion");
   const auto share = [&](const auto& known) {
     return static_cast<double>(std::ranges::count_if(d.windows, known)) /
            static_cast<double>(d.windows.size());

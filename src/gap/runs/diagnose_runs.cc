@@ -109,12 +109,7 @@ class RunDiagnoser {
         {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
     state_effects(answer_, power_w, d);
     for (const std::string& reason : answer_.reasons) d.reasons.push_back(sentence(reason));
-    const auto moved_w = [&](const dynamics::ActiveEffect& effect) {
-      std::vector<dynamics::ActiveEffect> with = fit_->data.in_file;
-      with.push_back(effect);
-      return (posterior::predicted_power(fit_->data, with) - fit_->unchanged_w).cwiseAbs().mean();
-    };
-    state_offer(*fit_, answer_, moved_w, false, d);
+    state_offer(*fit_, answer_, false, d);
     state_held_out(answer_.held_out, d);
     if (d.baseline) add_terms(*d.baseline);
   }

@@ -189,8 +189,7 @@ Diagnosis offered(const Offer& offer) {
   d.noise_floor = 0.01;
   state_effects(a, 100, d);
   state_held_out(a.held_out, d);
-  state_offer(
-      fit, a, [](const auto&) { return 22.0; }, false, d);
+  state_offer(fit, a, false, d);
   return d;
 }
 
