@@ -146,7 +146,7 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
 // Readings of the battery at these rows, ascending, of [from_s, from_s + length_s), and the motion about
 // them; empty if the motion is not available.
 std::optional<Window> power_row(const Track& c, std::span<const std::size_t> rows, double from_s,
-                                double length_s, double half_s, bool slopes) {
+                                double length_s, double half_s) {
   const auto count = static_cast<double>(rows.size());
   const auto mean = [&](const std::vector<double>& v) {
     double sum = 0;
@@ -194,7 +194,6 @@ std::optional<Window> power_row(const Track& c, std::span<const std::size_t> row
   w.battery_voltage_v = mean(c.battery_voltage);
   w.battery_current_a = mean(c.battery_current);
   w.battery_power_w = mean(c.battery_power);
-  if (slopes) w.battery_power_slope_w_s = line_at(c.time_s, c.battery_power, w.t_s, half_s).slope;
   w.mission_voltage_v = c.mean_battery_voltage_v;
   w.charge_as = mean(c.charge);
   w.payload_kg = mean(c.payload);
@@ -286,8 +285,6 @@ class MissionWindows {
     const auto updates = statistics::find_updates(t, track_.battery_current);
     const double length = power_row_s(updates.period_s),
                  half = std::max(settings_.length_s, line_rows * period_s_);
-    // A delay that checks did not measure is shorter than a row can show; a repeated reading has no slope.
-    const bool slopes = settings_.electrical_delay_s != 0 && !updates.held;
     double last = -2, next_span = 0;
     std::vector<std::size_t> rows;
     for (std::size_t k = 0; k < updates.at.size();) {
@@ -298,7 +295,7 @@ class MissionWindows {
       }
       const bool kept = position++ / kept_together % keep_every == 0;
       if (!kept || rows.empty()) continue;
-      auto w = power_row(track_, rows, row * length, length, half, slopes);
+      auto w = power_row(track_, rows, row * length, length, half);
       if (!w) continue;
       if (row >= next_span) {
         add_span(track_, settings_, robot_, *w);

@@ -198,8 +198,8 @@ class Diagnoser {
   // The power of a load independent of motion, beyond the other causes, in the first and in the last third of
   // the time since a mission began.
   std::array<double, 2> load_by_time() const {
-    const auto load = std::ranges::find(answer_.model, "accessory_load",
-                                        [](const auto& e) { return e.effect->info().id; });
+    const auto load =
+        std::ranges::find(answer_.model, "accessory_load", [](const auto& e) { return e.effect->info().id; });
     const double load_w = load == answer_.model.end() ? 0 : load->values[0];
     const posterior::PowerRows& rows = fit_->data.rows;
     double end_s = 0;

@@ -18,9 +18,8 @@ double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_
 // voltages that the file's windings need. NaN without both currents.
 double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_read);
 
-// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: the power of the motors
-// and the idle power of the robot file in its place.
-std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
-                                   bool of_motors);
+// Battery power of every window [W], NaN where it was not read; where no window has one, the power of the
+// motors and the idle power of the robot file.
+std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

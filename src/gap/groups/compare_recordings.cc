@@ -89,7 +89,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
     if (count[k] < min_group_windows)
       return invalid("log", "holds too little motion in group " + c.groups[k].name);
   }
-  if (!data.power && data.from_motion.alone())
+  if (!data.power && !data.motors && !data.voltages)
     return invalid("log", "measures neither power nor voltage nor current of the motors");
   describe(trusted, data, c);
   // Rows are equally long.

@@ -134,10 +134,8 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
            static_cast<double>(d.windows.size());
   };
   d.motors = share([](const Window& w) { return std::isfinite(w.current_a[0] + w.current_a[1]); }) > few;
-  d.from_motion.power = !d.motors;
-  d.from_motion.voltage = !d.motors && share([](const Window& w) {
-                                         return std::isfinite(w.voltage_v[0] + w.voltage_v[1]);
-                                       }) > few;
+  d.voltages = !d.motors &&
+               share([](const Window& w) { return std::isfinite(w.voltage_v[0] + w.voltage_v[1]); }) > few;
 
   std::vector<double> length_s, voltage_v;
   std::vector<windows::Track> tracks;
@@ -156,10 +154,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   }
   d.blocks = assign(d.windows, length_s);
   if (d.motors) {
-    const auto known = [](double p) { return std::isfinite(p); };
-    std::vector<double> power_w = measured_power(d.windows, robot, false);
-    if (std::ranges::none_of(power_w, known)) power_w = measured_power(d.windows, robot, true);
-    d.rows = rows_of(d.windows, power_w);
+    d.rows = rows_of(d.windows, measured_power(d.windows, robot));
   } else {
     for (std::size_t m = 0; m < missions.size(); ++m)
       add_readings(tracks[m], windows::median_period_s(missions[m]), voltage_v[m], m,
@@ -184,7 +179,7 @@ Data rows_of_witness(const Data& data, Witness witness, const Eigen::VectorXd& f
   std::ranges::copy(factors, d.factor_prior.begin());
   d.power = false;
   d.rows = {};
-  d.from_motion = {};
+  d.voltages = false;
   return d;
 }
 

@@ -7,19 +7,6 @@
 namespace joulecast::gap {
 namespace {
 
-TEST(PowerAlone, ComparesStartsAndStops) {
-  const made::Drives drives;
-  const dynamics::DriveModel model(drives.robot(), {});
-  std::size_t between = 0;
-  for (const Window& w : drives.windows()) {
-    const auto r = residuals(model, w, FromMotion{.power = true, .voltage = false});
-    // The drives have the model's power.
-    EXPECT_NEAR(r[index_of(Channel::power)], 0, 1e-9);
-    between += w.moving[0] || w.resting[0] ? 0 : 1;
-  }
-  EXPECT_GT(between, 10u);
-}
-
 // A bias of 1 A acts at the mission's mean voltage, independent of the noise of single readings.
 TEST(PowerAlone, AppliesBiasAtMissionVoltage) {
   const made::Drives drives;
