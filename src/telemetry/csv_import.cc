@@ -238,7 +238,8 @@ class Importer {
       notes_.push_back(
           R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
           " holds them between the rows");
-    for (const auto& notes : {table_.notes(), notes_})
+    first.settings_detected = table_.settings().size();
+    for (const auto& notes : {table_.settings(), table_.notes(), notes_})
       first.notes.insert(first.notes.end(), notes.begin(), notes.end());
     for (Joined& joined : joined_) {
       if (!joined.lags_us.empty())
