@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/autonomy_json.h"
+#include "answers/autonomy.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "base/sleep.h"
@@ -37,7 +37,6 @@
 #include "server/fleet_events.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
-#include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"

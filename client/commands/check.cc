@@ -15,7 +15,6 @@
 #include "base/json_text.h"
 #include "base/try.h"
 #include "client/commands/check_findings.h"
-#include "client/commands/gap_output.h"
 #include "client/commands/import.h"
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/core/noncopyable.hpp>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -108,11 +109,8 @@ bool is_bag(const std::string& path) {
 }
 
 // The recordings of bags as tables in a folder, converted by deploy/import/bags.cjs.
-class ConvertedBags {
+class ConvertedBags : boost::noncopyable {
  public:
-  ConvertedBags() = default;
-  ConvertedBags(const ConvertedBags&) = delete;
-  ConvertedBags& operator=(const ConvertedBags&) = delete;
   ~ConvertedBags() {
     std::error_code left;
     fs::remove_all(folder_, left);

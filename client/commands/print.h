@@ -69,4 +69,11 @@ void print_ledger_terms(const Json& terms_j, double whole_j, const std::string& 
 // Prints the missions of a back-test with the errors before and after, and their means.
 void print_back_test(const Json& test, const std::string& unit);
 
+// An autonomy answer, of one robot or of a fleet, as tables for people. An answer in another dialect is
+// printed as received. `unit` is that of energies (print.h).
+void print_autonomy(const nlohmann::json& answer, const std::string& unit);
+
+// Prints the JSON of a diagnosis, made offline or by a daemon, or of a comparison.
+void print_diagnosis(const nlohmann::json& diagnosis, const std::string& unit = energy_units.front());
+
 }  // namespace joulecast::client

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 #include "base/host_clock.h"
 #include "base/json_number.h"
 #include "base/try.h"

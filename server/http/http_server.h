@@ -110,8 +110,6 @@ class HttpServer {
   static Result<std::unique_ptr<HttpServer>> start(const ServerOptions& options, const Router& router,
                                                    ServerObserver* observer = nullptr);
   ~HttpServer();
-  HttpServer(const HttpServer&) = delete;
-  HttpServer& operator=(const HttpServer&) = delete;
 
   // The port really bound.
   std::uint16_t port() const;

@@ -1,3 +1,5 @@
+#include "answers/autonomy.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,9 +8,8 @@
 #include <set>
 #include <string>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/battery_dialects.h"
-#include "answers/json/profile_json.h"
+#include "answers/battery_dialects.h"
+#include "answers/profile.h"
 #include "ingest/forecasts.h"
 #include "server/api/robot_json.h"
 #include "tests/ingest/harness.h"

@@ -1,3 +1,5 @@
+#include "answers/profile.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,9 +8,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::answers {

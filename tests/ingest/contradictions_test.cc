@@ -8,8 +8,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
 #include "base/text_file.h"
 #include "ingest/contradiction_watch.h"
 #include "ingest/forecasts.h"
