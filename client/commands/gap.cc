@@ -66,16 +66,6 @@ auto with_progress(const char* activity, Work work) {
   return work(progress.shares());
 }
 
-// `error` of an adoption as an error of `option`, which requested it; of --effect for a choice among effects.
-Error of_option(Error error, const std::string& option) {
-  if (error.fault == Fault::conflict) {
-    error.message = "refused: " + error.message;
-    if (error.field.empty()) error.message += "; --force overrides it";
-  }
-  error.field = error.field == "effect" ? "--effect" : option;
-  return error;
-}
-
 // Prints the document of a diagnosis, with --json as it is.
 void show_diagnosis(const GapOptions& options, const nlohmann::ordered_json& document) {
   if (options.json)

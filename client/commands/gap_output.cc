@@ -323,4 +323,13 @@ void print_diagnosis(const Json& d, const std::string& unit) {
   if (kind == "comparison") print_comparison(d, unit);
 }
 
+Error of_option(Error error, const std::string& option) {
+  if (error.fault == Fault::conflict) {
+    error.message = "refused: " + error.message;
+    if (error.field.empty()) error.message += "; --force overrides it";
+  }
+  error.field = error.field == "effect" ? "--effect" : option;
+  return error;
+}
+
 }  // namespace joulecast::client

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
+
 // Printing of answers as text.
 namespace joulecast::client {
 
@@ -75,5 +77,8 @@ void print_autonomy(const nlohmann::json& answer, const std::string& unit);
 
 // Prints the JSON of a diagnosis, made offline or by a daemon, or of a comparison.
 void print_diagnosis(const nlohmann::json& diagnosis, const std::string& unit = energy_units.front());
+
+// `error` of an adoption as an error of `option`, which requested it; of --effect for a choice among effects.
+Error of_option(Error error, const std::string& option);
 
 }  // namespace joulecast::client

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "client/commands/outcome.h"
 #include "client/commands/print.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
