@@ -273,6 +273,25 @@ TEST_F(CheckCommand, ImportNumbersOnOverMissions) {
   EXPECT_THAT(printed_, ::testing::Not(HasSubstr("restart")));
 }
 
+TEST_F(CheckCommand, ReplayWithoutMissionsFails) {
+  auto robot = made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });
+  telemetry::Recording& mission = robot.recordings.missions[0];
+  for (signals::Sample& sample : mission.samples) sample.battery_voltage_v *= 1000;
+  const std::string path = (folder_ / "millivolts.lcmlog").string();
+  auto log = telemetry::EventLogWriter::create(path);
+  ASSERT_TRUE(log);
+  ASSERT_TRUE(telemetry::write_recording(*log, mission));
+  ASSERT_TRUE(log->close());
+  CLI::App program("joulecast");
+  Exit exit = Exit::ok;
+  add_replay(program, exit);
+  std::vector<std::string> words{
+      "replay", path, "--into", (folder_ / "history.db").string(), "--robot", file("amr.json", amr_.dump())};
+  std::reverse(words.begin(), words.end());
+  program.parse(words);
+  EXPECT_EQ(exit, Exit::fault);
+}
+
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {
   const auto robot =
       made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });
