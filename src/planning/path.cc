@@ -259,7 +259,7 @@ class Builder {
   }
 
   void turn(double angle) {
-    if (angle == 0) return;
+    if (std::fabs(angle) < same_place_m) return;  // of a point one metre away
     close();
     Run run;
     run.turn = angle > 0 ? 1 : -1;

@@ -181,12 +181,7 @@ class Request {
     else if (ok.error().fault != Fault::infeasible || ok.error().field != "value_of_time_w")
       return ok;
     const double spare_j = keeps_until_j_ - least_j, smallest_j = 1e-12 * budget_j;
-    const auto refused = [&] {
-      return fail(Fault::infeasible, "energy_budget_j",
-                  fmt::format("is {} J, the path needs no less than {:.6f} J", budget_j,
-                              std::ceil(least_j / (1 - of_rows) * 1e6) / 1e6));
-    };
-    if (spare_j < 0) return refused();
+    if (spare_j < 0) return {};  // the plan's energy is compared with the budget
     // log(E - E_min) falls nearly linearly in -log(price).
     Search at{-std::log(usual_w), -0.8, -std::log(1e6 * usual_w), -std::log(1e-6 * usual_w)};
     const auto above = [&](double energy_j, double least_energy_j) {
@@ -209,7 +204,7 @@ class Request {
     const double rest = std::clamp(1e-5 * budget_j / std::max(spare_j, smallest_j), 1e-3, 0.5);
     TRY(draw_in(at, -std::log1p(-rest), truly_above));
     keep();
-    if (kept_.answers.empty()) return refused();
+    if (kept_.answers.empty()) return solve(0);
     std::swap(answers_, kept_.answers), price_w_ = kept_.price_w;
     return {};
   }
@@ -619,6 +614,12 @@ Result<Plan> Request::written() {
   s.duration_s = duration_s();
   s.distance_m = path_.distance_m();
   s.turned_rad = path_.turned_rad();
+  // Answers have ten digits: an energy that one contains is a budget.
+  if (problem_.energy_budget_j && s.energy_j > (1 + 1e-9) * *problem_.energy_budget_j) {
+    return fail(Fault::infeasible, "energy_budget_j",
+                fmt::format("is {} J, the path needs no less than {:.6f} J", *problem_.energy_budget_j,
+                            std::ceil(s.energy_j * 1e6) / 1e6));
+  }
   return writer.finish();
 }
 

@@ -363,7 +363,7 @@ Result<void> RunPlanner::check_feasible() const {
   SpeedGrid from_rest = grid;
   from_rest.start = 0;
   return fail(Fault::infeasible, "limits",
-              "no speed satisfies them " + number(where) + " along the way" +
+              "no speed satisfies them " + number(where) + " m along the way" +
                   (speed_envelope(from_rest).feasible ? "; starting from rest would" : ""));
 }
 

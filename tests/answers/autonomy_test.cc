@@ -322,6 +322,7 @@ TEST_F(AutonomyAnswer, FaultsNameTheField) {
       "task drives or stands");
   EXPECT_EQ(fault({{"tasks", {{{"task_id", "t"}, {"payload_kg", 5}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"tasks", {{{"path", json::array()}}}}}, &live_).field, "/tasks/0/path");
+  EXPECT_EQ(fault({{"tasks", {{{"dropoff", {{"x_m", 1}, {"y_m", 2}}}}}}}, &live_).field, "/tasks/0/pickup");
   EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");
   EXPECT_EQ(fault({{"confidence", 1}}, &live_).field, "/confidence");
   EXPECT_EQ(fault({{"to_charger_m", 5}, {"tasks", {{{"distances_m", {5}}}}}}, &live_).field,

@@ -129,10 +129,11 @@ void read_legs(Fields& fields, Way& way, PathContext& context) {
   if (turns) angles = fields.numbers("turns_rad", 0, segments_of_path.maximum, turn);
   for (std::size_t k = 0; k < std::max(lengths.size(), angles.size()); ++k) {
     way.path.emplace_back(planning::Dwell{0});  // ends the straight before
-    if (k < lengths.size() && lengths[k] > 0) way.path.emplace_back(planning::Straight{lengths[k]});
+    if (k < lengths.size() && lengths[k] >= planning::same_place_m)
+      way.path.emplace_back(planning::Straight{lengths[k]});
     if (k < angles.size() && angles[k] != 0) way.path.emplace_back(planning::TurnInPlace{angles[k]});
   }
-  const auto zero = [](double amount) { return amount == 0; };
+  const auto zero = [](double amount) { return std::fabs(amount) < planning::same_place_m; };
   const bool stands = std::ranges::all_of(lengths, zero);
   way.placed = turns || stands;
   if (fields.ok() && !context.may_stand && stands && std::ranges::all_of(angles, zero))
@@ -142,6 +143,7 @@ void read_legs(Fields& fields, Way& way, PathContext& context) {
 // There without payload, from there to the drop-off with it.
 void read_stations(Fields& fields, Way& way, PathContext& context) {
   const planning::Stations& at = *way.stations;
+  if (!at.pickup) fields.required("pickup");
   if (!at.dropoff) fields.required("dropoff");
   const Bounds allowed{.minimum = 0, .maximum = context.payload_limit_kg};
   const double payload_kg = fields.has("payload_kg") ? fields.number("payload_kg", allowed) : 0;
@@ -241,7 +243,7 @@ const Input<Way, PathContext>& route_input() {
               read_legs)
           .custom("turns_rad", of_numbers(turn), "turns on the spot between them, positive to the left",
                   [](Fields&, Way&, PathContext&) {});
-  static const auto input = WayInput().either("path", path, legs);
+  static const auto input = WayInput().either(path, legs);
   return input;
 }
 
@@ -250,7 +252,7 @@ const Input<Way, PathContext>& way_input() {
       WayInput()
           .include(stations_input(), [](Way& way) -> planning::Stations& { return way.stations.emplace(); })
           .check(read_stations);
-  static const auto input = WayInput().either("pickup", stations, route_input());
+  static const auto input = WayInput().either(stations, route_input());
   return input;
 }
 

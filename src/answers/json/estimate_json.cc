@@ -122,7 +122,7 @@ const Input<EstimateInput, PathContext>& estimate_input() {
   static const auto input =
       Part("A motion to estimate: a profile, or a path")
           .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)
-          .either("profile", given, planned);
+          .either(given, planned);
   return input;
 }
 
