@@ -21,6 +21,7 @@
 #include "history/open_store.h"
 #include "history/spool.h"
 #include "history/writer.h"
+#include "ingest/charge_watch.h"
 #include "ingest/contradiction_watch.h"
 #include "ingest/ingest_service.h"
 #include "ingest/keeping.h"
@@ -510,8 +511,15 @@ struct Application::Parts {
       snapshot->robot_id = robot.robot_id;
       snapshot->received_utime_us = std::min(heard_us, host_utime_us());
       snapshot->sample.utime_us = heard_us;
-      if (last && !ingest::doubts_battery(contradictions))
-        snapshot->state_of_charge = snapshot->charge.estimate.charge = last->state_of_charge;
+      const auto model = models.find(robot.robot_id);
+      if (last && model != nullptr && !ingest::doubts_battery(contradictions)) {
+        TRY_ASSIGN(const auto memory, store->learned(robot.robot_id, ingest::charge_topic));
+        ingest::ChargeWatch charge(model->robot);
+        if (memory) charge.recall(memory->body_json);
+        charge.recall(last->utime_us, last->state_of_charge);
+        snapshot->charge = charge.view();
+        snapshot->state_of_charge = snapshot->charge.estimate.charge;
+      }
       snapshot->contradictions = std::move(contradictions);
       fleet.publish(std::move(snapshot));
     }

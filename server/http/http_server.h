@@ -95,7 +95,7 @@ class ServerObserver {
 };
 
 // Whether that IP address is reachable from this machine only; false for text that is no IP address.
-bool is_loopback(std::string_view address);
+Result<bool> is_loopback(std::string_view address);
 
 // Whether the files can be used; errors name the setting.
 Result<void> check_tls(const TlsFiles& files);
