@@ -335,7 +335,7 @@ TEST(Profile, SpendsAnEnergyBudget) {
   const json again = answer(profile_answer, {{"path", path}, {"deadline_s", a["duration_s"]}});
   EXPECT_NEAR(again["energy_j"], a["energy_j"].get<double>(), 1e-4 * least_j);
   EXPECT_EQ(fault(profile_answer, {{"distances_m", {1e-300}}}).field, "/distances_m");
-  EXPECT_EQ(fault(profile_answer, {{"path", {{{"kind", "turn"}, {"angle_rad", 1e-300}}}}}).field, "/path");
+  EXPECT_EQ(fault(profile_answer, {{"path", {{{"kind", "turn"}, {"angle_rad", 1e-300}}}}}).field, "path");
   EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 9}, {"deadline_s", 9}}).field,
             "/energy_budget_j");
   EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 0.5 * least_j}}).fault,
