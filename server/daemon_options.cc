@@ -93,8 +93,8 @@ Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options
 Result<void> check_exposure(const DaemonOptions& options) {
   for (const std::string& origin : options.http.allowed_origins) TRY(http::check_origin(origin));
   const std::string& address = options.http.address;
-  TRY_ASSIGN(const bool loopback, http::is_loopback(address));
-  if (loopback) return {};
+  TRY_ASSIGN(const auto listening, http::address_of(address, "http.address"));
+  if (listening.is_loopback()) return {};
   if (!options.token_file.empty()) {
     if (options.http.tls.certificate.empty())
       log_warning(

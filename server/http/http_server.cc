@@ -37,19 +37,7 @@ ServerObserver& nobody() {
   return observer;
 }
 
-Result<net::ip::address> address_of(const std::string& text) {
-  boost::system::error_code error;
-  const auto address = net::ip::make_address(text, error);
-  if (error) return invalid("http.address", "must be an IPv4 or IPv6 address, is " + text);
-  return address;
-}
-
 }  // namespace
-
-Result<bool> is_loopback(std::string_view text) {
-  TRY_ASSIGN(const auto address, address_of(std::string(text)));
-  return address.is_loopback();
-}
 
 std::string_view to_string(Refusal refusal) {
   static constexpr std::string_view names[] = {
@@ -90,7 +78,7 @@ struct HttpServer::Impl {
 };
 
 Result<void> HttpServer::Impl::open() {
-  TRY_ASSIGN(const auto address, address_of(core->options.address));
+  TRY_ASSIGN(const auto address, address_of(core->options.address, "http.address"));
   TRY_ASSIGN(core->proxies, TrustedProxies::parse(core->options.trusted_proxies));
   if (core->options.tls.given()) {
     TRY_ASSIGN(core->tls, make_tls(core->options.tls));

@@ -94,9 +94,6 @@ class ServerObserver {
   virtual void connections(std::size_t /*open*/) {}
 };
 
-// Whether that IP address is reachable from this machine only; false for text that is no IP address.
-Result<bool> is_loopback(std::string_view address);
-
 // Whether the files can be used; errors name the setting.
 Result<void> check_tls(const TlsFiles& files);
 
