@@ -84,6 +84,7 @@ Result<void> HttpServer::Impl::open() {
     TRY_ASSIGN(core->tls, make_tls(core->options.tls));
   }
   const Tcp::endpoint endpoint(address, core->options.port);
+  boost::system::error_code error;
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);

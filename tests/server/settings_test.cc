@@ -204,8 +204,8 @@ TEST(CheckConfig, ReportsUnusableAddresses) {
   std::vector<std::string> fields;
   for (const Error& fault : faults_of(options)) {
     fields.push_back(fault.field);
-    if (fault.field == "http.address")
-      EXPECT_EQ(fault.message, "must be an IPv4 or IPv6 address, is localhost");
+    if (fault.field != "http.address") continue;
+    EXPECT_EQ(fault.message, "must be an IPv4 or IPv6 address, is localhost");
   }
   for (const char* field : {"http.address", "http.trusted_proxies", "lcm.url"})
     EXPECT_EQ(std::ranges::count(fields, field), 1) << field;
