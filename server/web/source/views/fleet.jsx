@@ -78,18 +78,7 @@ const widths = Object.fromEntries(
 
 // Of rows {id, state, needs, ratio, entry, scale}.
 const columns = [
-  [
-    'robot',
-    'Robot',
-    '',
-    ({ id }) => (
-      <a href={robotLink(id)} title={id}>
-        {id}
-      </a>
-    ),
-    (r) => r.id,
-    { head: true },
-  ],
+  ['robot', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
   ['health', 'Attention', '', (r) => <Health state={r.state} reasons={r.needs?.reasons} />, urgency],
   ['power', 'Power', 'figure', Power, (r) => powerNow(r.state)],
   ['spark', 'Last 90 s', '', ({ entry }) => <Sparkline track={entry.power} />],
