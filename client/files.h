@@ -3,7 +3,7 @@
 #include <string>
 
 #include "base/error.h"
-#include "base/output_file.h"
+#include "base/text_file.h"
 
 namespace joulecast::client {
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/core/noncopyable.hpp>
 #include <chrono>
 #include <csignal>
 
@@ -8,12 +9,10 @@ namespace joulecast::client {
 // During its lifetime ctrl-C and SIGTERM end waits instead of the program. The signals are blocked and
 // polled, so that no code runs in a handler; threads started during that time inherit the block. Construct it
 // before opening LCM.
-class InterruptGuard {
+class InterruptGuard : boost::noncopyable {
  public:
   InterruptGuard();
   ~InterruptGuard();
-  InterruptGuard(const InterruptGuard&) = delete;
-  InterruptGuard& operator=(const InterruptGuard&) = delete;
 
   // Waits until then or until interrupted; true from the first interrupt on.
   bool wait_until(std::chrono::steady_clock::time_point until);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/core/noncopyable.hpp>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -10,13 +11,11 @@ namespace joulecast::client {
 // A progress line on standard error: redrawn in place on a terminal, never written if standard error is a
 // file or a pipe. It appears after one second, so that short work writes nothing, and the destructor clears
 // it.
-class Progress {
+class Progress : boost::noncopyable {
  public:
   // `work` is the activity ("replaying"), `unit` the counted items ("messages"); total 0: unknown in advance.
   Progress(std::string work, std::string unit, std::uint64_t total = 0);
   ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
 
   // Suitable for every step of a loop: the clock is read once in 1024 calls.
   void advance(std::uint64_t by = 1) {

@@ -62,5 +62,5 @@ CREATE UNLOGGED TABLE cluster_live (
   node TEXT COLLATE "C" NOT NULL,
   epoch BIGINT NOT NULL,
   number BIGINT NOT NULL,  -- counts up under one epoch
-  body BYTEA NOT NULL      -- src/ingest/snapshot_bytes.h
+  body BYTEA NOT NULL      -- src/ingest/fleet_view.h
 ) WITH (fillfactor = 50);

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/autonomy_json.h"
+#include "answers/autonomy.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "base/sleep.h"
@@ -21,6 +21,7 @@
 #include "history/open_store.h"
 #include "history/spool.h"
 #include "history/writer.h"
+#include "ingest/charge_watch.h"
 #include "ingest/contradiction_watch.h"
 #include "ingest/ingest_service.h"
 #include "ingest/keeping.h"
@@ -37,7 +38,6 @@
 #include "server/fleet_events.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
-#include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
@@ -510,8 +510,15 @@ struct Application::Parts {
       snapshot->robot_id = robot.robot_id;
       snapshot->received_utime_us = std::min(heard_us, host_utime_us());
       snapshot->sample.utime_us = heard_us;
-      if (last && !ingest::doubts_battery(contradictions))
-        snapshot->state_of_charge = snapshot->charge.estimate.charge = last->state_of_charge;
+      const auto model = models.find(robot.robot_id);
+      if (last && model != nullptr && !ingest::doubts_battery(contradictions)) {
+        TRY_ASSIGN(const auto memory, store->learned(robot.robot_id, ingest::charge_topic));
+        ingest::ChargeWatch charge(model->robot);
+        if (memory) charge.recall(memory->body_json);
+        charge.recall(last->utime_us, last->state_of_charge);
+        snapshot->charge = charge.view();
+        snapshot->state_of_charge = snapshot->charge.estimate.charge;
+      }
       snapshot->contradictions = std::move(contradictions);
       fleet.publish(std::move(snapshot));
     }

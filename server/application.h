@@ -15,8 +15,6 @@ class Application {
   // Opens the store, loads the models, starts ingest and HTTP. When it returns, the service is available.
   static Result<std::unique_ptr<Application>> start(const DaemonOptions& options);
   ~Application();
-  Application(const Application&) = delete;
-  Application& operator=(const Application&) = delete;
 
   // The bound port.
   std::uint16_t http_port() const;

@@ -10,6 +10,7 @@
 #include "base/try.h"
 #include "ingest/model_loading.h"
 #include "ingest/signature_gate.h"
+#include "server/http/admission.h"
 #include "server/http/cors.h"
 #include "server/http/gate.h"
 #include "telemetry/datagram_socket.h"
@@ -92,7 +93,8 @@ Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options
 Result<void> check_exposure(const DaemonOptions& options) {
   for (const std::string& origin : options.http.allowed_origins) TRY(http::check_origin(origin));
   const std::string& address = options.http.address;
-  if (http::is_loopback(address)) return {};
+  TRY_ASSIGN(const auto listening, http::address_of(address, "http.address"));
+  if (listening.is_loopback()) return {};
   if (!options.token_file.empty()) {
     if (options.http.tls.certificate.empty())
       log_warning(
@@ -118,12 +120,14 @@ std::vector<Error> faults_of(const DaemonOptions& options) {
     if (!result) faults.push_back(result.error());
   };
   check(check_exposure(options));
+  check(http::TrustedProxies::parse(options.http.trusted_proxies));
   check(http::Gate::open({.token_file = options.token_file}));
   if (options.http.tls.given()) check(http::check_tls(options.http.tls));
   if (const Result<void> sound = history::check_store_url(store_url(options)); !sound)
     faults.push_back({Fault::invalid, "store.url", sound.error().message});
   check(cluster_options(options));
   check(ingest::SignatureGate(options.ingest.signatures).read_keys());
+  check(telemetry::check_lcm_url(options.ingest.lcm_url));
   check(telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from));
   if (!options.webhooks_file.empty()) check(server::read_webhooks(options.webhooks_file));
   if (!options.mqtt_url.empty()) check(mqtt_options(options));

@@ -1,8 +1,8 @@
 #include "server/fleet_events.h"
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 #include "server/api/robot_json.h"
-#include "server/http/json_digits.h"
+#include "server/http/text.h"
 
 namespace joulecast::server {
 namespace {

@@ -60,8 +60,6 @@ class Metrics {
  public:
   Metrics();
   ~Metrics();
-  Metrics(const Metrics&) = delete;
-  Metrics& operator=(const Metrics&) = delete;
 
   // The same name and labels give the same metric. A name that violates the convention aborts.
   Counter counter(const std::string& name, const std::string& help, const Labels& labels = {});

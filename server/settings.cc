@@ -24,13 +24,6 @@ const Setting* find_setting(std::string_view key) {
   return nullptr;
 }
 
-template <class Name>
-std::vector<std::string> all_names(Name name) {
-  std::vector<std::string> names;
-  for (const Setting& setting : settings_table()) names.push_back(name(setting));
-  return names;
-}
-
 using Type = Target::Type;
 
 std::string joined(const auto& texts) {
@@ -192,9 +185,7 @@ Result<void> Settings::set(std::string_view key, std::string_view value, Origin 
   const Setting* setting = find_setting(key);
   if (setting == nullptr) {
     return invalid(std::string(where),
-                   "unknown setting" + did_you_mean(key, all_names([](const Setting& each) {
-                                                      return std::string(each.key);
-                                                    })));
+                   "unknown setting" + did_you_mean(key, settings_table(), &Setting::key));
   }
   if (auto broken = put(*setting, value, setting->member(options_)))
     return invalid(std::string(where), std::move(*broken));
@@ -209,20 +200,20 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
     return invalid(std::string(file), describe(document.error()));
   }
   if (!document->is_object()) return invalid(std::string(file), "must be a JSON object of sections");
-  const std::vector<std::string> keys = all_names([](const Setting& each) { return std::string(each.key); });
   Problems problems;
   for (const auto& [section, content] : document->items()) {
     if (section == "$schema" && content.is_string()) continue;
     if (!content.is_object()) {
       problems.add(invalid(prefix + section, "must be an object such as {\"http\": {\"port\": 8080}}" +
-                                                 did_you_mean(section, keys)));
+                                                 did_you_mean(section, settings_table(), &Setting::key)));
       continue;
     }
     for (const auto& [name, value] : content.items()) {
       const std::string key = section + "." + name;
       const Setting* setting = find_setting(key);
       if (setting == nullptr) {
-        problems.add(invalid(prefix + key, "unknown setting" + did_you_mean(key, keys)));
+        problems.add(
+            invalid(prefix + key, "unknown setting" + did_you_mean(key, settings_table(), &Setting::key)));
         continue;
       }
       const Target member = default_member(*setting);
@@ -287,7 +278,8 @@ Result<const Setting*> setting_of_flag(const std::string& name) {
       std::find_if(table.begin(), table.end(), [&](const Setting& each) { return each.flag() == name; });
   if (setting != table.end()) return &*setting;
   if (name == "--config") return nullptr;
-  auto known = all_names([](const Setting& each) { return each.flag(); });
+  std::vector<std::string> known;
+  for (const Setting& each : table) known.push_back(each.flag());
   for (const auto& each : actions) known.emplace_back(each.first);
   known.emplace_back("--config");
   return invalid(name, "unknown flag" + did_you_mean(name, known));
@@ -344,7 +336,8 @@ void read_environment(const std::vector<std::string>& environment, Given& given,
     const auto setting = std::find_if(table.begin(), table.end(),
                                       [&](const Setting& each) { return each.environment() == name; });
     if (setting == table.end()) {
-      auto known = all_names([](const Setting& each) { return each.environment(); });
+      std::vector<std::string> known;
+      for (const Setting& each : table) known.push_back(each.environment());
       known.emplace_back("JOULECAST_CONFIG");
       problems.add(invalid(name, "unknown environment variable" + did_you_mean(name, known)));
       continue;

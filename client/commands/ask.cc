@@ -12,12 +12,12 @@
 #include <string_view>
 #include <vector>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
+#include "answers/profile.h"
 #include "base/json_number.h"
 #include "base/try.h"
-#include "client/commands/print_autonomy.h"
+#include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"

@@ -118,8 +118,8 @@ void add_battery(CLI::App& program, Exit& exit) {
         "discharge), a folder, or the common beginning of the names of one battery's files, which selects "
         "<beginning>_rw.csv. Each discharge begins full and at rest",
         file_of("csv"), required},
-       {"--battery", &O::battery, "battery object of a robot file, as calibrate writes it", file_of("json"),
-        required},
+       {"--battery", &O::battery, "battery as calibrate writes it, or robot file with its battery",
+        file_of("json"), required},
        {"--from", &O::from, "recorded quantity from which the model predicts", one_of({"current", "power"})},
        {"--json", &O::json, "print the result as JSON"}},
       "joulecast battery predict cell_rw.csv --battery cell.json\n"

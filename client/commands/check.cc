@@ -7,6 +7,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <ranges>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,7 +15,6 @@
 #include "base/json_text.h"
 #include "base/try.h"
 #include "client/commands/check_findings.h"
-#include "client/commands/gap_output.h"
 #include "client/commands/import.h"
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
@@ -192,6 +192,9 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
       report.findings.push_back({true, table, std::move(place), imports.error().message});
       continue;
     }
+    const telemetry::ImportReport& first = imports->front().report;
+    for (const std::string& setting : first.notes | std::views::take(first.settings_detected))
+      report.subjects.back()["settings"].push_back(setting);
     for (telemetry::Import& import : *imports) {
       judge(import, table, report.findings);
       number_on(import.recording, next);
@@ -282,6 +285,8 @@ void print_check(const Report& report) {
                           figures["standing_h"].is_null()
                               ? ""
                               : fmt::format(", {:.1f} h at rest", figures["standing_h"].get<double>()));
+    for (const Json& setting : subject.value("settings", Json::array()))
+      text += "; " + setting.get<std::string>();
     fmt::print("{}\n", text);
   }
   for (const auto& [channel, tally] : report.watch.channels())

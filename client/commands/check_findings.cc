@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <ranges>
 
 #include "client/commands/server_answer.h"
 #include "client/wrapped.h"
@@ -131,7 +132,8 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
   counted(report.rows_unsorted, "", "rows were out of order and are sorted by time");
   counted(report.rows_out_of_time, "", "rows repeat the time of another row and are skipped");
   counted(report.glitches.size(), "", "values are outside their limits; the report of the import lists them");
-  for (const std::string& note : report.notes) findings.push_back({false, table, "", note});
+  for (const std::string& note : report.notes | std::views::drop(report.settings_detected))
+    findings.push_back({false, table, "", note});
   for (const telemetry::JoinReport& join : report.joins) {
     counted(join.beyond_tolerance, join.table,
             fmt::format("rows of the main table have no reading within the tolerance; {} have one, {:.3f} s "
@@ -197,11 +199,8 @@ nlohmann::json to_json(const Findings& findings) {
 
 void print(const Findings& findings) {
   for (const Finding& f : findings) {
-    const std::string where = f.about +
-                              (f.field.empty()            ? ""
-                               : f.field.starts_with('/') ? "#"
-                                                          : " ") +
-                              f.field;
+    const bool named = f.says.find(f.field) != std::string::npos;
+    const std::string where = f.about + (named ? "" : (f.field.starts_with('/') ? "#" : " ") + f.field);
     fmt::print("{}\n", wrapped(fmt::format("{} {}: {}", f.fault ? "fault  " : "warning", where, f.says),
                                help_width(), 8));
   }

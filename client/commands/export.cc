@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/output_file.h"
+#include "base/text_file.h"
 #include "base/try.h"
 #include "client/commands/option.h"
 #include "client/commands/server_answer.h"

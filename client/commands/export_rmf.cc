@@ -9,7 +9,7 @@
 
 #include "base/json_number.h"
 #include "base/median.h"
-#include "base/output_file.h"
+#include "base/text_file.h"
 #include "base/try.h"
 #include "client/commands/rmf_fit.h"
 #include "client/commands/server_answer.h"

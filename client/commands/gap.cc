@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -9,27 +11,253 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
+#include "base/host_clock.h"
+#include "base/json_number.h"
 #include "base/try.h"
-#include "client/commands/gap_output.h"
+#include "base/utc_time.h"
 #include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
+#include "client/interrupt.h"
 #include "client/log_progress.h"
 #include "client/progress.h"
+#include "client/wrapped.h"
 #include "describe/input.h"
 #include "describe/table.h"
 #include "energy/back_test.h"
 #include "energy/power_windows.h"
 #include "gap/diagnose/recordings.h"
+#include "gap/groups/comparison_json.h"
+#include "gap/runs/runs_json.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
+#include "report/report.h"
 #include "robot/robot_file.h"
 #include "telemetry/recording_set.h"
 
 namespace joulecast::client {
 namespace {
+
+struct GapOptions {
+  std::vector<std::string> logs;
+  std::vector<std::string> runs;  // CSV files, instead of logs
+  std::vector<std::string> test;  // logs of other missions
+  std::string robot_file, robot_id, server;
+  std::string compare_by;  // groups to compare: "prefix" or "suffix" of the missions' ids, or a label
+  std::string report;      // HTML file to write; empty: none
+  std::string apply;       // robot file to write; empty: none
+  std::string unit = energy_units.front();
+  std::size_t max_missions = 200;
+  std::vector<std::string> effect;  // to take of those that are not distinguished
+  bool robot_model = false;         // diagnose the robot file, not the energies of a model in a table of runs
+  bool adopt = false;               // in the daemon, after a back-test
+  bool force = false;               // write in spite of the diagnosis's refusal, and over existing files
+  bool json = false;
+
+  gap::Choice choice() const { return {effect, force}; }
+};
+
+// Work with a progress line in per cent.
+template <class Work>
+auto with_progress(const char* activity, Work work) {
+  Progress progress(activity, "%", 100);
+  return work(progress.shares());
+}
+
+// Prints the document of a diagnosis, with --json as it is.
+void show_diagnosis(const GapOptions& options, const nlohmann::ordered_json& document) {
+  if (options.json)
+    fmt::print("{}\n", document.dump(2));
+  else
+    print_diagnosis(document, options.unit);
+}
+
+// Writes the page of --report, if one is requested.
+Result<void> write_page(const GapOptions& options, const nlohmann::ordered_json& document,
+                        const robot::RobotModel& robot, const report::ReportOrigin& origin) {
+  if (options.report.empty()) return {};
+  return write_text_file(options.report, report::report_html(document, robot, origin),
+                         existing(options.force));
+}
+
+// Writes the robot file of --apply with the effects found, or returns the refusal.
+Result<void> apply_offer(const GapOptions& options, const gap::Offer& offer, const robot::RobotModel& robot) {
+  const auto extended = gap::take(offer, robot, options.choice());
+  if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
+  return write_text_file(options.apply, robot::to_json_text(*extended) + '\n', existing(options.force));
+}
+
+// The origin of a report: names of files without their folders, and the present time.
+report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file) {
+  report::ReportOrigin origin;
+  for (const std::string& source : sources)
+    origin.sources.push_back(std::filesystem::path(source).filename().string());
+  origin.model = std::filesystem::path(robot_file).filename().string();
+  origin.made_at = format_utc(host_utime_us());
+  origin.software = "joulecast " JOULECAST_VERSION;
+  return origin;
+}
+
+Result<gap::RunSet> read_tables(const GapOptions& options, const robot::RobotModel& robot) {
+  std::vector<gap::RunFile> files;
+  for (const std::string& name : options.runs) {
+    TRY_ASSIGN(auto text, read_file(name));
+    files.push_back({name, std::move(text)});
+  }
+  auto runs = gap::read_runs(files, robot);
+  if (!runs) runs.error().message += "; joulecast gap --help lists the columns";
+  return runs;
+}
+
+// Makes a comparison, prints it and writes its page.
+Result<Exit> compare_and_print(const std::function<Result<gap::Comparison>(const gap::Progress&)>& compare,
+                               const robot::RobotModel& robot, const GapOptions& options,
+                               const report::ReportOrigin& origin) {
+  TRY_ASSIGN(const auto comparison, with_progress("comparing", compare));
+  const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
+  show_diagnosis(options, document);
+  TRY(write_page(options, document, robot, origin));
+  return Exit::ok;
+}
+
+Result<Exit> compare(const GapOptions& options, const gap::RunSet& runs, const robot::RobotModel& robot) {
+  TRY_ASSIGN(const auto groups, runs.groups_by(options.compare_by));
+  return compare_and_print(
+      [&](const gap::Progress& progress) { return gap::compare_runs(runs, groups, robot, progress); }, robot,
+      options, report_origin(options.runs, options.robot_file));
+}
+
+// The columns of a table of runs, for the help.
+std::string run_columns_help() {
+  constexpr std::size_t column_width = 28;
+  std::string help = "Columns of a table of runs:";
+  for (const gap::RunColumn& column : gap::run_columns()) {
+    std::string row = "  " + std::string(column.name) +
+                      (column.unit.empty() ? "" : std::string(" [").append(column.unit).append("]"));
+    row.resize(std::max(row.size() + 1, column_width), ' ');
+    help += '\n' + row + wrapped(column.meaning, help_width(), row.size());
+  }
+  return help;
+}
+
+// Diagnoses the gap from energies of whole runs.
+Result<Exit> gap_from_missions(const GapOptions& options, const robot::RobotModel& robot) {
+  TRY_ASSIGN(const auto runs, read_tables(options, robot));
+  if (!options.compare_by.empty()) return compare(options, runs, robot);
+  TRY_ASSIGN(const auto diagnosis, with_progress("diagnosing", [&](const gap::Progress& progress) {
+               return gap::diagnose_runs(runs, robot, options.robot_model, progress);
+             }));
+  const nlohmann::ordered_json document = gap::runs_to_json(diagnosis);
+  show_diagnosis(options, document);
+  TRY(write_page(options, document, robot, report_origin(options.runs, options.robot_file)));
+  if (!options.apply.empty()) TRY(apply_offer(options, gap::offer_of(diagnosis.diagnosis), robot));
+  return Exit::ok;
+}
+
+constexpr std::chrono::milliseconds between_looks{250};
+
+std::string diagnosis_target(const Json& job, const char* part = "") {
+  return fmt::format("/v1/diagnoses/{}{}", job["id"].get<std::int64_t>(), part);
+}
+
+Result<Json> follow(const std::string& server, Json job) {
+  InterruptGuard interrupt;
+  Progress progress("diagnosing", "%", 100);
+  const std::string target = diagnosis_target(job);
+  while (job["state"] == "queued" || job["state"] == "running") {
+    progress.reach(static_cast<std::uint64_t>(100 * number_or_nan(job["progress"])));
+    if (interrupt.wait_until(std::chrono::steady_clock::now() + between_looks)) {
+      if (const auto cancelled = ask(server, HttpMethod::del, target); !cancelled)
+        return fail(Fault::conflict, "",
+                    "interrupted; the diagnosis continues: " + describe(cancelled.error()));
+      return fail(Fault::conflict, "", "interrupted; the diagnosis is cancelled");
+    }
+    TRY_ASSIGN(job, ask_object(server, target));
+  }
+  if (job["state"] != "done") {
+    const std::string why = job["error"].is_string() ? job["error"].get<std::string>() : "";
+    return fail(Fault::infeasible, "",
+                fmt::format("the diagnosis {}: {}", job["state"].get<std::string>(), why));
+  }
+  return job;
+}
+
+void print_result(const Json& job) {
+  fmt::print("diagnosis {} against model version {}, {} held back for the back-test\n",
+             job["id"].get<std::int64_t>(), job["model_version"].get<std::int64_t>(),
+             count_of(job["held_back"].size(), "mission"));
+  print_diagnosis(job["result"]);
+}
+
+// Writes the diagnosed robot file with the effects found.
+Result<void> write_model(const GapOptions& options, const Json& job) {
+  TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(job["result"]));
+  TRY_ASSIGN(const auto now, ask_object(options.server, robot_target(options.robot_id)));
+  if (now["model_version"] != job["model_version"])
+    return fail(Fault::conflict, "--apply", "another version of the model has come into force since");
+  TRY_ASSIGN(const auto robot, robot::read_robot(now["model"]));
+  return apply_offer(options, offer, robot);
+}
+
+// The result of the adoption; of a refused one, the problem with its back-test.
+Result<Json> adopt_diagnosis(const GapOptions& options, const Json& job) {
+  Json wanted = {{"diagnosis_id", job["id"]}, {"force", options.force}};
+  if (!options.effect.empty()) wanted["effect"] = options.effect;
+  TRY_ASSIGN(const auto address, parse_server_url(options.server));
+  TRY_ASSIGN(const auto reply,
+             http_request(address, HttpMethod::post, robot_target(options.robot_id, "/models"), wanted.dump(),
+                          std::chrono::minutes(1)));
+  if (!reply.ok() && reply.status != 409) return tl::unexpected(error_of(reply));
+  return object_of(reply.body, options.server);
+}
+
+void print_adopted_version(const Json& adoption, const std::string& unit) {
+  if (adoption.contains("back_test")) print_back_test(adoption["back_test"], unit);
+  if (adoption.value("adopted", false))
+    fmt::print("adopted as model version {}\n", adoption["model_version"].get<std::int64_t>());
+}
+
+Result<Exit> carry_out(const GapOptions& options) {
+  const Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
+  TRY_ASSIGN(const auto begun, ask(options.server, HttpMethod::post, "/v1/diagnoses", wanted.dump()));
+  TRY_ASSIGN(auto first, object_of(begun.body, options.server));
+  TRY_ASSIGN(const auto job, follow(options.server, std::move(first)));
+  if (!options.report.empty()) {
+    TRY_ASSIGN(const auto page, ask(options.server, HttpMethod::get, diagnosis_target(job, "/report")));
+    TRY(write_text_file(options.report, page.body, existing(options.force)));
+  }
+  if (!options.json) print_result(job);
+  Json out = job["result"];
+  out["diagnosis_id"] = job["id"];
+  std::vector<Error> refusals;
+  if (!options.apply.empty()) {
+    if (const auto written = write_model(options, job); !written) refusals.push_back(written.error());
+  }
+  if (options.adopt) {
+    TRY_ASSIGN(const auto adoption, adopt_diagnosis(options, job));
+    out["adopted"] = adoption;
+    if (!options.json) print_adopted_version(adoption, options.unit);
+    if (!adoption.value("adopted", false))
+      refusals.push_back({Fault::conflict, "--adopt", adoption.value("detail", "was refused")});
+  }
+  if (options.json) print_json(out);
+  Exit exit = Exit::ok;
+  for (const Error& refusal : refusals) exit = report(refusal);
+  return exit;
+}
+
+// Starts a diagnosis of a daemon's own history of a robot, follows the job and prints its result. An
+// interrupt cancels the job.
+Result<Exit> gap_from_server(const GapOptions& options) {
+  return carry_out(options).map_error([](Error error) {
+    for (const auto& [field, flag] :
+         {std::pair{"/robot_id", "--robot-id"}, {"/max_missions", "--max-missions"}, {"/effect", "--effect"}})
+      if (error.field == field) error.field = flag;
+    return error;
+  });
+}
 
 // `joulecast gap --test`: a robot file and the one with the effects found, on missions that were not
 // diagnosed; with enough battery power, also a linear regression on the missions that were.

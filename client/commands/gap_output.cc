@@ -1,16 +1,12 @@
-#include "client/commands/gap_output.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "base/host_clock.h"
 #include "base/json_number.h"
-#include "base/utc_time.h"
+#include "client/commands/print.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"
@@ -250,15 +246,7 @@ void print_runs(const Json& d) {
   fmt::print("modelled energies from {}; the runs scatter by {:.1f} % in addition to any cause\n",
              member_at(d, "model/given") == true ? "the table" : "the robot file",
              percent_at(d, "scatter/run"));
-  if (!d["left_out_conditions"].empty())
-    fmt::print("mean error of the runs of one condition when all of them are held out:\n");
-  for (const Json& l : d["left_out_conditions"])
-    fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (linear regression {:.1f} %), effects:{}\n",
-               text(l["left_out"]), l["runs"].get<std::size_t>(), percent_at(l, "held_out_before"),
-               percent_at(l, "held_out_after"), percent_at(l, "baseline_held_out"), names_in(l["effects"]));
   print_limits(d);
-  if (!d["not_visible"].empty())
-    fmt::print("  - Not detectable in these runs:{}\n", names_in(d["not_visible"]));
 }
 
 std::string per_way(const Json& joules_per_m, const std::string& unit) {
@@ -302,48 +290,6 @@ void print_comparison(const Json& d, const std::string& unit) {
   print_limits(d);
 }
 
-Json number_or_null(double value) {
-  return std::isfinite(value) ? Json(value) : Json();
-}
-
-Json field_json(const telemetry::FieldTally& field, std::uint64_t messages, double rate_hz) {
-  const double share = messages > 0 ? 1.0 / static_cast<double>(messages) : 0;
-  return {{"name", field.name},
-          {"last", number_or_null(field.last)},
-          {"least", number_or_null(field.least)},
-          {"greatest", number_or_null(field.greatest)},
-          {"measured", field.measured},
-          {"change_rate_hz", rate_hz * static_cast<double>(field.changes) * share}};
-}
-
-Json tally_json(const std::string& channel, const telemetry::ChannelTally& tally) {
-  Json fields = Json::array();
-  for (const telemetry::FieldTally& field : tally.fields)
-    fields.push_back(field_json(field, tally.messages, tally.rate_hz()));
-  Json faults = Json::object();
-  for (const auto& [reason, fault] : tally.faults)
-    faults[reason] = {{"count", fault.first}, {"last", fault.second}};
-  Json out{{"channel", channel},
-           {"robot_id", tally.robot_id},
-           {"messages", tally.messages},
-           {"bytes", tally.bytes},
-           {"rate_hz", tally.rate_hz()},
-           {"first_utime_us", tally.first_utime_us},
-           {"last_utime_us", tally.last_utime_us},
-           {"longest_silence_s", 1e-6 * static_cast<double>(tally.longest_silence_us)},
-           {"clock_ahead_s", 1e-6 * static_cast<double>(tally.clock_ahead_us)},
-           {"senders", tally.senders.size()},
-           {"last", tally.last_text},
-           {"fields", std::move(fields)},
-           {"faults", std::move(faults)}};
-  if (tally.subject != telemetry::Subject::telemetry) return out;
-  const telemetry::SequenceCounters& s = tally.sequence;
-  out["sequence"] = {
-      {"missing", s.missing},   {"duplicate", s.duplicate},           {"late", s.late},
-      {"restarts", s.restarts}, {"clock_backward", s.clock_backward}, {"clock_forward", s.clock_forward}};
-  return out;
-}
-
 }  // namespace
 
 void print_diagnosis(const Json& d, const std::string& unit) {
@@ -376,50 +322,6 @@ Error of_option(Error error, const std::string& option) {
   }
   error.field = error.field == "effect" ? "--effect" : option;
   return error;
-}
-
-void show_diagnosis(const GapOptions& options, const nlohmann::ordered_json& document) {
-  if (options.json)
-    fmt::print("{}\n", document.dump(2));
-  else
-    print_diagnosis(document, options.unit);
-}
-
-Result<void> write_page(const GapOptions& options, const nlohmann::ordered_json& document,
-                        const robot::RobotModel& robot, const report::ReportOrigin& origin) {
-  if (options.report.empty()) return {};
-  return write_text_file(options.report, report::report_html(document, robot, origin),
-                         existing(options.force));
-}
-
-Result<void> apply_offer(const GapOptions& options, const gap::Offer& offer, const robot::RobotModel& robot) {
-  const auto extended = gap::take(offer, robot, options.choice());
-  if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
-  return write_text_file(options.apply, robot::to_json_text(*extended) + '\n', existing(options.force));
-}
-
-report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file) {
-  report::ReportOrigin origin;
-  for (const std::string& source : sources)
-    origin.sources.push_back(std::filesystem::path(source).filename().string());
-  origin.model = std::filesystem::path(robot_file).filename().string();
-  origin.made_at = format_utc(host_utime_us());
-  origin.software = "joulecast " JOULECAST_VERSION;
-  return origin;
-}
-
-Json to_json(const telemetry::ChannelWatch& watch) {
-  Json channels = Json::array();
-  for (const auto& [channel, tally] : watch.channels()) channels.push_back(tally_json(channel, tally));
-  return {{"channels", std::move(channels)}};
-}
-
-Json to_json(const Listened& listened) {
-  Json out = to_json(listened.watch);
-  Json& dropped = out["dropped_datagrams"] = Json::object();
-  for (std::size_t k = 0; k < telemetry::datagram_fault_names.size(); ++k)
-    dropped[std::string(telemetry::datagram_fault_names[k])] = listened.datagrams.faults[k].load();
-  return out;
 }
 
 }  // namespace joulecast::client

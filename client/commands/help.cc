@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/algorithm/string/replace.hpp>
 #include <vector>
 
 #include "base/nearest_word.h"
@@ -123,6 +124,9 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
     text = about_rest(*app, rest);
   } else if (missing && text.starts_with("A subcommand")) {
     text = fmt::format("requires a command: {}", fmt::join(names_of_commands(*app), ", "));
+  } else if (const auto list = text.find('['); missing && text.starts_with("Exactly 1")) {
+    text = "requires exactly one of " +
+           boost::replace_all_copy(text.substr(list + 1, text.find(']') - list - 1), ",", ", ");
   } else if (error.get_name() == "ArgumentMismatch" || error.get_name() == "ConversionError") {
     // "--robot: 1 required TEXT missing"; "Could not convert: --length = three".
     const std::size_t dashes = text.find("--");

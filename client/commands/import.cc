@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/core/noncopyable.hpp>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -108,11 +109,8 @@ bool is_bag(const std::string& path) {
 }
 
 // The recordings of bags as tables in a folder, converted by deploy/import/bags.cjs.
-class ConvertedBags {
+class ConvertedBags : boost::noncopyable {
  public:
-  ConvertedBags() = default;
-  ConvertedBags(const ConvertedBags&) = delete;
-  ConvertedBags& operator=(const ConvertedBags&) = delete;
   ~ConvertedBags() {
     std::error_code left;
     fs::remove_all(folder_, left);
@@ -165,7 +163,7 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
     for (telemetry::Import& import : *missions) {
       all.push_back({std::move(import), source.shown});
       if (all.back().begin_utime_us() < telemetry::year_2000_utime_us)
-        return invalid("--start", source.shown + " contains no dates: give the time of its first row");
+        return invalid("--start", source.shown + " begins before 2000: give the time of its first row");
     }
     if (how.start_utime_us) how.start_utime_us = all.back().end_utime_us() + how.pause_us;
   }

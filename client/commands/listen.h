@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "base/error.h"
@@ -39,5 +40,11 @@ struct Listened {
 [[nodiscard]] std::string dropped_datagrams(const Listened& listened);
 // Report when no robot was received: the address, messages on other channels, and suggestions.
 [[nodiscard]] std::string why_silent(const std::string& lcm_url, const Listened& listened);
+
+// {"channels": [{"channel", "robot_id", "messages", "rate_hz", ..., "fields": [...], "faults": {...}}]};
+// numbers that are not available are null.
+[[nodiscard]] nlohmann::json to_json(const telemetry::ChannelWatch& watch);
+// The same with {"dropped_datagrams": {...}}.
+[[nodiscard]] nlohmann::json to_json(const Listened& listened);
 
 }  // namespace joulecast::client

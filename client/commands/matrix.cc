@@ -1,3 +1,5 @@
+#include "answers/matrix.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/matrix_json.h"
 #include "base/json_number.h"
 #include "base/try.h"
 #include "client/commands/server_answer.h"

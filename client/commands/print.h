@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
+
 // Printing of answers as text.
 namespace joulecast::client {
 
@@ -68,5 +70,15 @@ void print_ledger_terms(const Json& terms_j, double whole_j, const std::string& 
 
 // Prints the missions of a back-test with the errors before and after, and their means.
 void print_back_test(const Json& test, const std::string& unit);
+
+// An autonomy answer, of one robot or of a fleet, as tables for people. An answer in another dialect is
+// printed as received. `unit` is that of energies (print.h).
+void print_autonomy(const nlohmann::json& answer, const std::string& unit);
+
+// Prints the JSON of a diagnosis, made offline or by a daemon, or of a comparison.
+void print_diagnosis(const nlohmann::json& diagnosis, const std::string& unit = energy_units.front());
+
+// `error` of an adoption as an error of `option`, which requested it; of --effect for a choice among effects.
+Error of_option(Error error, const std::string& option);
 
 }  // namespace joulecast::client

@@ -10,7 +10,6 @@
 #include "base/host_clock.h"
 #include "base/try.h"
 #include "client/commands/check_findings.h"
-#include "client/commands/gap_output.h"
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"

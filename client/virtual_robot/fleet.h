@@ -6,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "base/error.h"
 #include "client/virtual_robot/virtual_robot.h"
 #include "signals/mission_event.h"
 

@@ -60,8 +60,6 @@ class AttentionList {
   // `is_own`: see WatchOptions. The list outlives no member of `services`.
   AttentionList(const Services& services, std::function<bool(const std::string& robot_id)> is_own,
                 std::function<void(const Error&)> on_error);
-  AttentionList(const AttentionList&) = delete;
-  AttentionList& operator=(const AttentionList&) = delete;
 
   // Looks once a second, in a thread of its own, until stop().
   void start();

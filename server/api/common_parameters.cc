@@ -5,7 +5,6 @@
 #include "base/text.h"
 #include "base/try.h"
 #include "base/utc_time.h"
-#include "server/http/json_digits.h"
 #include "server/http/text.h"
 
 namespace joulecast::api {

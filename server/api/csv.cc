@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/resolution.h"
-#include "server/http/json_digits.h"
 #include "server/http/text.h"
 
 namespace joulecast::api {

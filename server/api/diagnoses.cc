@@ -4,7 +4,6 @@
 
 #include "base/json_writer.h"
 #include "base/try.h"
-#include "base/utc_time.h"
 #include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"

@@ -1,8 +1,7 @@
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 #include "base/try.h"
 #include "robot/kind.h"
 #include "server/api/common_parameters.h"

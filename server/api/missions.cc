@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 #include "base/try.h"
 #include "describe/input.h"
 #include "server/api/change.h"

@@ -5,7 +5,6 @@
 
 #include "base/json_writer.h"
 #include "base/try.h"
-#include "base/utc_time.h"
 #include "describe/table.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/matrix_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
+#include "answers/matrix.h"
+#include "answers/profile.h"
 #include "base/parallel.h"
 #include "base/try.h"
 #include "describe/input.h"

@@ -1,6 +1,5 @@
 #include "ingest/recent_values.h"
 
-#include <algorithm>
 #include <set>
 #include <string>
 #include <vector>

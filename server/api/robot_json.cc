@@ -3,8 +3,8 @@
 #include <array>
 #include <cmath>
 
-#include "answers/json/drive_json.h"
-#include "answers/json/mission_json.h"
+#include "answers/drive.h"
+#include "answers/mission.h"
 
 namespace joulecast::api {
 namespace {

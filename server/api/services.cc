@@ -2,11 +2,11 @@
 
 #include <iterator>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/matrix_json.h"
-#include "answers/json/mission_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
+#include "answers/matrix.h"
+#include "answers/mission.h"
+#include "answers/profile.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "robot/robot_schema.h"
 #include "server/api/common_parameters.h"

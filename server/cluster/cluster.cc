@@ -6,7 +6,7 @@
 #include "base/fault_boundary.h"
 #include "base/sleep.h"
 #include "base/try.h"
-#include "ingest/snapshot_bytes.h"
+#include "ingest/fleet_view.h"
 #include "robot/robot_file.h"
 #include "server/cluster/assignment.h"
 

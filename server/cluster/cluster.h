@@ -69,8 +69,6 @@ class Cluster {
 
   Cluster(ClusterOptions options, Parts parts);
   ~Cluster();
-  Cluster(const Cluster&) = delete;
-  Cluster& operator=(const Cluster&) = delete;
 
   // Joins, and starts the threads. Fault::conflict on "cluster.node" or "cluster.name".
   Result<void> start(const std::string& address);

@@ -7,8 +7,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
+#include <boost/core/noncopyable.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -119,11 +119,9 @@ class Frames {
   std::string came_;
 };
 
-class Child {
+class Child : boost::noncopyable {
  public:
   Child(pid_t id, int from) : id_(id), from_(from) {}
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
   ~Child() {
     close(from_);
     kill(id_, SIGKILL);

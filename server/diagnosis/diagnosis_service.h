@@ -67,8 +67,6 @@ class DiagnosisService {
                    const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
                    Ended on_ended = {});
   ~DiagnosisService();  // cancels the running job
-  DiagnosisService(const DiagnosisService&) = delete;
-  DiagnosisService& operator=(const DiagnosisService&) = delete;
 
   // Marks jobs that the last daemon left unfinished, then starts to work.
   Result<void> start();

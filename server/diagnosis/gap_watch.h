@@ -56,8 +56,6 @@ class GapWatch {
            const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
            std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
            std::function<void(const Error&)> on_error);
-  GapWatch(const GapWatch&) = delete;
-  GapWatch& operator=(const GapWatch&) = delete;
 
   void start();
   void stop() { thread_ = {}; }

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 #include "base/try.h"
 #include "robot/robot_file.h"
 

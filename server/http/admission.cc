@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ranges>
 
+#include "base/try.h"
 #include "server/http/text.h"
 
 namespace joulecast::http {
@@ -109,12 +110,18 @@ net::ip::address unmapped(const net::ip::address& address) {
   return net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
 }
 
+Result<net::ip::address> address_of(const std::string& text, const char* setting) {
+  boost::system::error_code error;
+  const auto address = net::ip::make_address(text, error);
+  if (error) return invalid(setting, "must be an IPv4 or IPv6 address, is " + text);
+  return address;
+}
+
 Result<TrustedProxies> TrustedProxies::parse(const std::vector<std::string>& addresses) {
   TrustedProxies proxies;
   for (const std::string& text : addresses) {
-    boost::system::error_code error;
-    proxies.addresses_.push_back(unmapped(net::ip::make_address(text, error)));
-    if (error) return invalid("http.trusted_proxies", "must be IP addresses, has " + text);
+    TRY_ASSIGN(const auto address, address_of(text, "http.trusted_proxies"));
+    proxies.addresses_.push_back(unmapped(address));
   }
   return proxies;
 }

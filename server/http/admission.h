@@ -59,6 +59,7 @@ class TrustedProxies {
   std::vector<boost::asio::ip::address> addresses_;
 };
 
+Result<boost::asio::ip::address> address_of(const std::string& text, const char* setting);
 // As itself where it is an IPv4 address mapped into IPv6.
 boost::asio::ip::address unmapped(const boost::asio::ip::address& address);
 

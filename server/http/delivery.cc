@@ -1,11 +1,13 @@
 #include "server/http/delivery.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
+#include <zstd.h>
 
+#include <array>
+#include <boost/core/noncopyable.hpp>
 #include <utility>
 
-#include "server/http/content_coding.h"
-#include "server/http/json_digits.h"
 #include "server/http/text.h"
 
 namespace joulecast::http {
@@ -94,6 +96,138 @@ Response Asset::answer(const Request& request) const {
   if (compressed) response.headers.emplace_back("Content-Encoding", "gzip");
   response.shared_body = compressed ? gzipped_ : plain_;
   return response;
+}
+
+namespace {
+
+// Answers are coded on demand: speed counts more than the last tenth of size.
+constexpr int gzip_level = 4;
+constexpr int zstd_level = 1;
+constexpr int gzip_window = 15 + 16;
+constexpr std::size_t step_bytes = 64 * 1024;
+
+// Appends coded pieces of one body.
+class Coder {
+ public:
+  enum class Until : std::uint8_t { later, now, end };  // how much of the input must be output
+  virtual ~Coder() = default;
+  virtual bool add(std::string_view bytes, Until until, std::string& out) = 0;
+};
+
+class GzipCoder final : public Coder, boost::noncopyable {
+ public:
+  explicit GzipCoder(int level) {
+    ready_ = deflateInit2(&stream_, level, Z_DEFLATED, gzip_window, 8, Z_DEFAULT_STRATEGY) == Z_OK;
+  }
+  ~GzipCoder() override { deflateEnd(&stream_); }
+
+  bool add(std::string_view bytes, Until until, std::string& out) override {
+    if (!ready_) return false;
+    const int flush = until == Until::end ? Z_FINISH : until == Until::now ? Z_SYNC_FLUSH : Z_NO_FLUSH;
+    stream_.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));  // zlib only reads it
+    stream_.avail_in = static_cast<uInt>(bytes.size());
+    do {
+      stream_.next_out = step_.data();
+      stream_.avail_out = static_cast<uInt>(step_.size());
+      if (deflate(&stream_, flush) == Z_STREAM_ERROR) return false;
+      out.append(reinterpret_cast<const char*>(step_.data()), step_.size() - stream_.avail_out);
+    } while (stream_.avail_out == 0);
+    return true;
+  }
+
+ private:
+  z_stream stream_{};
+  bool ready_ = false;
+  std::array<Bytef, step_bytes> step_;
+};
+
+class ZstdCoder final : public Coder, boost::noncopyable {
+ public:
+  ZstdCoder() : stream_(ZSTD_createCCtx()) {
+    if (stream_ != nullptr) ZSTD_CCtx_setParameter(stream_, ZSTD_c_compressionLevel, zstd_level);
+  }
+  ~ZstdCoder() override { ZSTD_freeCCtx(stream_); }
+
+  bool add(std::string_view bytes, Until until, std::string& out) override {
+    if (stream_ == nullptr) return false;
+    const ZSTD_EndDirective directive = until == Until::end   ? ZSTD_e_end
+                                        : until == Until::now ? ZSTD_e_flush
+                                                              : ZSTD_e_continue;
+    ZSTD_inBuffer in{bytes.data(), bytes.size(), 0};
+    for (;;) {
+      ZSTD_outBuffer step{step_.data(), step_.size(), 0};
+      const std::size_t rest = ZSTD_compressStream2(stream_, &step, &in, directive);
+      if (ZSTD_isError(rest) != 0U) return false;
+      out.append(step_.data(), step.pos);
+      const bool done = until == Until::later ? in.pos == in.size : rest == 0;
+      if (done) return true;
+    }
+  }
+
+ private:
+  ZSTD_CCtx* stream_;
+  std::array<char, step_bytes> step_;
+};
+
+std::unique_ptr<Coder> coder_of(Coding coding) {
+  if (coding == Coding::zstd) return std::make_unique<ZstdCoder>();
+  return std::make_unique<GzipCoder>(gzip_level);
+}
+
+std::string all_of(Coder& coder, std::string_view bytes) {
+  std::string out;
+  return coder.add(bytes, Coder::Until::end, out) ? out : std::string();
+}
+
+class CodedStream final : public StreamSource {
+ public:
+  CodedStream(Coding coding, std::shared_ptr<StreamSource> inner)
+      : coder_(coder_of(coding)), inner_(std::move(inner)) {}
+
+  Next pull(std::string& out) override {
+    piece_.clear();
+    const Next next = inner_->pull(piece_);
+    if (next == Next::abort) return next;
+    const auto until = next == Next::end    ? Coder::Until::end
+                       : next == Next::wait ? Coder::Until::now
+                                            : Coder::Until::later;
+    return coder_->add(piece_, until, out) ? next : Next::abort;
+  }
+  void on_wake(std::function<void()> wake) override { inner_->on_wake(std::move(wake)); }
+  void cancel() override { inner_->cancel(); }
+  bool must_close() const override { return inner_->must_close(); }
+  bool endless() const override { return inner_->endless(); }
+  bool on_worker() const override { return inner_->on_worker(); }
+
+ private:
+  std::unique_ptr<Coder> coder_;
+  std::shared_ptr<StreamSource> inner_;
+  std::string piece_;
+};
+
+}  // namespace
+
+std::string_view name(Coding coding) {
+  return coding == Coding::gzip ? "gzip" : coding == Coding::zstd ? "zstd" : "identity";
+}
+
+Coding coding_of(std::string_view accept_encoding) {
+  if (accept_encoding.empty()) return Coding::identity;
+  if (lists(accept_encoding, "zstd")) return Coding::zstd;
+  return lists(accept_encoding, "gzip") ? Coding::gzip : Coding::identity;
+}
+
+std::string coded(Coding coding, std::string_view bytes) {
+  return all_of(*coder_of(coding), bytes);
+}
+
+std::string gzip_smallest(std::string_view bytes) {
+  GzipCoder coder(Z_BEST_COMPRESSION);
+  return all_of(coder, bytes);
+}
+
+std::shared_ptr<StreamSource> coded(Coding coding, std::shared_ptr<StreamSource> inner) {
+  return std::make_shared<CodedStream>(coding, std::move(inner));
 }
 
 }  // namespace joulecast::http

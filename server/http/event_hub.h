@@ -36,8 +36,6 @@ class EventHub {
   EventHub();
   explicit EventHub(const Options& options);
   ~EventHub();
-  EventHub(const EventHub&) = delete;
-  EventHub& operator=(const EventHub&) = delete;
 
   // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
   // select (a robot's id; empty goes to all).

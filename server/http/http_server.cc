@@ -1,6 +1,5 @@
 #include "server/http/http_server.h"
 
-#include <algorithm>
 #include <atomic>
 #include <exception>
 #include <future>
@@ -38,12 +37,6 @@ ServerObserver& nobody() {
 }
 
 }  // namespace
-
-bool is_loopback(std::string_view text) {
-  boost::system::error_code error;
-  const net::ip::address address = net::ip::make_address(std::string(text), error);
-  return !error && address.is_loopback();
-}
 
 std::string_view to_string(Refusal refusal) {
   static constexpr std::string_view names[] = {
@@ -84,14 +77,13 @@ struct HttpServer::Impl {
 };
 
 Result<void> HttpServer::Impl::open() {
-  boost::system::error_code error;
-  const auto address = net::ip::make_address(core->options.address, error);
-  if (error) return invalid("http.address", "must be an IPv4 or IPv6 address, is " + core->options.address);
+  TRY_ASSIGN(const auto address, address_of(core->options.address, "http.address"));
   TRY_ASSIGN(core->proxies, TrustedProxies::parse(core->options.trusted_proxies));
   if (core->options.tls.given()) {
     TRY_ASSIGN(core->tls, make_tls(core->options.tls));
   }
   const Tcp::endpoint endpoint(address, core->options.port);
+  boost::system::error_code error;
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);

@@ -94,9 +94,6 @@ class ServerObserver {
   virtual void connections(std::size_t /*open*/) {}
 };
 
-// Whether that IP address is reachable from this machine only; false for text that is no IP address.
-bool is_loopback(std::string_view address);
-
 // Whether the files can be used; errors name the setting.
 Result<void> check_tls(const TlsFiles& files);
 
@@ -110,8 +107,6 @@ class HttpServer {
   static Result<std::unique_ptr<HttpServer>> start(const ServerOptions& options, const Router& router,
                                                    ServerObserver* observer = nullptr);
   ~HttpServer();
-  HttpServer(const HttpServer&) = delete;
-  HttpServer& operator=(const HttpServer&) = delete;
 
   // The port really bound.
   std::uint16_t port() const;

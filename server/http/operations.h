@@ -1,16 +1,16 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "describe/schema.h"
+#include "server/http/http_server.h"
 #include "server/http/router.h"
-
-namespace joulecast {
-class Metrics;
-}
+#include "server/metrics.h"
 
 namespace joulecast::http {
 
@@ -31,5 +31,29 @@ described::Schemas operations_schemas();
 
 // GET /v1/events: the live fleet as server-sent events; ?robot_id= selects one robot.
 Endpoint events_endpoint(EventHub& hub);
+
+// Counts the server's events. Labels are bounded: operations come from the table of endpoints, statuses from
+// the code that answers.
+class HttpMetrics : public ServerObserver {
+ public:
+  // The table lives as long as the router, which outlives this.
+  explicit HttpMetrics(Metrics& metrics);
+
+  void exchanged(const Exchange& exchange) override;
+  void refused(Refusal refusal) override;
+  void connections(std::size_t open) override;
+
+ private:
+  struct Series {
+    Counter requests;
+    Histogram duration;
+  };
+  Metrics& metrics_;
+  std::map<std::pair<const char*, unsigned>, Series> series_;  // by operation and status; I/O thread only
+  std::vector<Counter> refusals_;
+  Counter sent_bytes_;
+  Counter received_bytes_;
+  Gauge connections_;
+};
 
 }  // namespace joulecast::http

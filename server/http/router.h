@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "access/role.h"
+#include "access/token.h"
 #include "server/http/message.h"
 
 namespace joulecast::http {
@@ -100,8 +100,6 @@ class Router {
   // Two endpoints with the same method and path shape, or a malformed template, are our bug and abort.
   explicit Router(std::vector<Endpoint> endpoints, FaultSink on_fault = {}, Guard guard = {});
   ~Router();
-  Router(const Router&) = delete;
-  Router& operator=(const Router&) = delete;
 
   // The result of matching a request's head: an endpoint to run, or a final answer.
   struct Match {

@@ -6,18 +6,24 @@
 // asio.h stays first.
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <thread>
 #include <unordered_set>
+#include <vector>
 
 #include "server/http/admission.h"
 #include "server/http/cors.h"
 #include "server/http/http_server.h"
-#include "server/http/worker_pool.h"
 
 namespace boost::asio::ssl {
 class context;
@@ -53,6 +59,26 @@ struct Caller {
   net::ip::address address;
   std::shared_ptr<Peer> peer;
   bool guest = false;
+};
+
+// A few threads and a bounded queue. Tasks must not throw.
+class WorkerPool {
+ public:
+  WorkerPool(unsigned threads, std::size_t capacity);
+  ~WorkerPool() = default;  // runs queued tasks, then joins
+
+  // False when the queue is full; `admitted`, for the next piece of work that has begun, is never refused.
+  // Any thread.
+  bool submit(std::function<void()> task, bool admitted = false);
+
+ private:
+  void work(const std::stop_token& stop);
+
+  std::mutex mutex_;
+  std::condition_variable_any filled_;
+  std::deque<std::function<void()>> queue_;
+  std::size_t capacity_;
+  std::vector<std::jthread> threads_;
 };
 
 struct Core {
@@ -107,8 +133,6 @@ class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(std::shared_ptr<Core> core, Caller caller);
   virtual ~Session() = default;
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
 
   void start();
   // Enforces the deadline of the session's present wait.

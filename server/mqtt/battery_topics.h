@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "answers/json/battery_dialects.h"
+#include "answers/battery_dialects.h"
 #include "base/error.h"
 
 struct mosquitto;
@@ -44,8 +44,6 @@ class BrokerLink {
   BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change)
       : options_(std::move(options)), on_change_(std::move(on_change)) {}
   ~BrokerLink() { stop(); }
-  BrokerLink(const BrokerLink&) = delete;
-  BrokerLink& operator=(const BrokerLink&) = delete;
 
   // Fault::invalid where the broker's name or the certificate authorities are unusable; an unreachable broker
   // is no fault.

@@ -58,8 +58,6 @@ class Webhooks {
 
   Webhooks(std::vector<Webhook> webhooks, Options options);
   ~Webhooks();
-  Webhooks(const Webhooks&) = delete;
-  Webhooks& operator=(const Webhooks&) = delete;
 
   // Any thread; never waits. `data` is JSON text; an empty robot_id concerns no single robot.
   void offer(std::string_view kind, std::string_view robot_id, std::int64_t utime_us, std::string_view data);

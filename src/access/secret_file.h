@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/core/noncopyable.hpp>
 #include <cstddef>
 #include <functional>
 #include <string>
@@ -16,12 +17,10 @@ namespace joulecast::access {
 Result<std::string> read_secret(const std::string& path, std::size_t least);
 
 // The new file next to the old one, as `<path>.new`, which exists only while it is written.
-class FileReplacement {
+class FileReplacement : boost::noncopyable {
  public:
   explicit FileReplacement(std::string path) : path_(std::move(path)) {}
   ~FileReplacement();
-  FileReplacement(const FileReplacement&) = delete;
-  FileReplacement& operator=(const FileReplacement&) = delete;
 
   // Returns whether there is an old file. The new one gets its mode and owner (without an old one: mode
   // 0640). Fault::conflict while another program changes the file.

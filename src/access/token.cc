@@ -111,4 +111,15 @@ Result<void> change_tokens(const std::string& path,
   return change_secret_file<std::vector<Token>>(path, read_tokens, to_json_text, change);
 }
 
+std::string_view name(Role role) {
+  constexpr std::string_view names[] = {"open", "read", "plan", "operate", "admin", "unstated"};
+  return names[static_cast<std::size_t>(role)];
+}
+
+std::optional<Role> role_of(std::string_view text) {
+  for (const Role role : {Role::read, Role::plan, Role::operate, Role::admin})
+    if (name(role) == text) return role;
+  return std::nullopt;
+}
+
 }  // namespace joulecast::access

@@ -2,14 +2,23 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "access/role.h"
 #include "base/error.h"
 
 namespace joulecast::access {
+
+// Permissions of a token, ascending: each role includes those before it. `open` needs no token; no token has
+// the role `unstated`, so a request that states no role is rejected.
+enum class Role : std::uint8_t { open, read, plan, operate, admin, unstated };
+
+std::string_view name(Role role);
+
+// One of the four roles that a token can have.
+std::optional<Role> role_of(std::string_view name);
 
 // A bearer token as it is kept: of the secret only its hash.
 struct Token {

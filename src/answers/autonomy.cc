@@ -3,11 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
 
 #include "answers/least_energy.h"
+#include "answers/mission.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
@@ -263,6 +267,520 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   out.outlook = look(usual);
   if (best) out.minimum_energy_outlook = look(*best);
   return out;
+}
+
+namespace {
+
+using described::Input;
+using described::Presence;
+
+constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
+constexpr std::size_t max_id_bytes = 200;
+constexpr Bounds payload_kg_bounds{.minimum = 0, .maximum = 1e6};
+constexpr Bounds charger_way_m{.minimum = 0, .maximum = 1e6};
+constexpr std::array<std::string_view, 7> what_to_do{"path",    "distances_m", "turns_rad", "pickup",
+                                                     "dwell_s", "turn_rad",    "distance_m"};
+
+// The members of the request that its tasks depend on.
+struct AutonomyContext : PathContext {
+  const AutonomyInput* input = nullptr;
+  bool placed = true;  // the next task begins at a known place
+};
+
+const Input<StatedPace>& pace_input() {
+  static const auto input =
+      Input<StatedPace>()
+          .number("speed_m_s", &StatedPace::speed_m_s, positive,
+                  "stated cruise speed; if ramps are stated too, the forecast contains no halts after drives")
+          .number("acceleration_m_s2", &StatedPace::acceleration_m_s2, positive,
+                  "acceleration of ramps in drives")
+          .number("yaw_rate_rad_s", &StatedPace::yaw_rate_rad_s, positive, "cruise rate of turns in place")
+          .number("yaw_acceleration_rad_s2", &StatedPace::yaw_acceleration_rad_s2, positive,
+                  "acceleration of ramps in turns in place");
+  return input;
+}
+
+void take_common_pace(Fields&, AutonomyTask& task, AutonomyContext& context) {
+  for (const auto member : {&StatedPace::speed_m_s, &StatedPace::acceleration_m_s2,
+                            &StatedPace::yaw_rate_rad_s, &StatedPace::yaw_acceleration_rad_s2})
+    if (!(task.pace.*member)) task.pace.*member = context.input->pace.*member;
+}
+
+void check_charger(Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+  const AutonomyInput& input = *context.input;
+  if (!task.to_charger_m && !input.charger && input.to_charger_m)
+    fields.fault("to_charger_m", "is required for every task where the charger's place is not given");
+  if (!task.to_charger_m && input.charger && !context.placed)
+    fields.fault(
+        "to_charger_m",
+        "is required after a task that states distances without turns, which ends at no known place");
+  if (task.to_charger_m && !input.charger && !input.to_charger_m)
+    fields.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
+}
+
+void check_place(Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+  if (task.way.stations && !context.placed)
+    fields.fault("pickup", "needs a known place to come from: a task before states distances without turns");
+  context.placed = context.placed && task.way.placed;
+}
+
+void check_something_to_do(Fields& fields, AutonomyTask&, AutonomyContext&) {
+  if (std::ranges::none_of(what_to_do, [&](std::string_view name) { return fields.has(name); }))
+    fields.fault("path", fmt::format("is required where none of {} is given: a task drives or stands",
+                                     fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", ")));
+}
+
+const Input<AutonomyTask, AutonomyContext>& task_input() {
+  using Part = Input<AutonomyTask, AutonomyContext>;
+  static const auto input =
+      Part("A task of a list",
+           "drive, then dwell; each task begins where the one before ended; a path, or distances and turns, "
+           "or a pick-up and a drop-off, or dwell_s alone")
+          .named("task")
+          .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
+          .number("payload_kg", &AutonomyTask::payload_kg, payload_kg_bounds,
+                  "carried from here on, absent: as before; with pickup, from there to dropoff, absent: none")
+          .include(pace_input(), &AutonomyTask::pace)
+          .check(take_common_pace)
+          .include(way_input(), &AutonomyTask::way)
+          .include(former_way_input(), &AutonomyTask::way)
+          .check(check_place)
+          .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
+                  "time at rest at the end of the task. If any task states it, 0 included, the forecast "
+                  "contains no other halts")
+          .number(
+              "to_charger_m", &AutonomyTask::to_charger_m, charger_way_m,
+              "distance from this task's end to the charger; required where the charger's position is not "
+              "given, and from a task on that states distances without turns, which ends at no known place")
+          .check(check_charger)
+          .finally(check_something_to_do);
+  return input;
+}
+
+const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
+  static const auto charger =
+      Input<Charger>()
+          .include(point_input<planning::Point>("place of the charger on the map"), &Charger::at)
+          .number("detour_factor", &Charger::detour_factor, {.minimum = 1, .maximum = 100},
+                  "of the way to it over the straight line", 1);
+  static const auto input =
+      Input<AutonomyRequest, AutonomyContext>(
+          "Conditions of an autonomy forecast; with an empty object, those of the robot at present")
+          .named("autonomy-request")
+          .number("state_of_charge", AT(input.state_of_charge), fraction,
+                  "state of charge; default: the live one")
+          .number("state_of_charge_sd", AT(input.state_of_charge_sd), {.minimum = 0, .maximum = 0.5},
+                  "standard deviation of state_of_charge")
+          .number("reserve_fraction", AT(input.reserve_fraction), fraction,
+                  "charge to be left at the end; default: that of the robot file")
+          .number("payload_kg", AT(input.payload_kg), payload_kg_bounds,
+                  "present payload; default: the live one, else 0")
+          .choice("driving", AT(input.driving), driving_names,
+                  "driving model. usual: at the robot's own pace or the stated one, which predicts how long "
+                  "the charge lasts in operation; minimum_energy: along the planner's profiles",
+                  static_cast<std::size_t>(Driving::usual))
+          .boolean(
+              "compare_minimum_energy",
+              [](AutonomyRequest& request, std::optional<bool> given) {
+                bool& compare = request.input.compare_minimum_energy;
+                compare = given.value_or(compare) && request.input.driving == Driving::usual;
+              },
+              "report what minimum-energy profiles would change; default true for one robot, false for a "
+              "fleet")
+          .boolean("compare_fastest", AT(input.compare_fastest),
+                   "report the fastest minimum-energy profiles with which the plan ends with the reserve at "
+                   "the probability confidence",
+                   false)
+          .number("value_of_time_w", AT(input.value_of_time_w), value_of_time_bounds_w,
+                  "value of time in minimum-energy profiles, W; the time_multiplier_w of a profile's "
+                  "certificate, with or without a deadline, reproduces that profile",
+                  0)
+          .include(pace_input(), AT(input.pace))
+          .number("confidence", AT(input.confidence), {.minimum = 0.01, .maximum = 0.999},
+                  "probability for the latest departure", 0.95)
+          .choice("dialect", &AutonomyRequest::dialect, dialect_names,
+                  "format of the response: that of this service or a battery message of another standard",
+                  static_cast<std::size_t>(Dialect::joulecast))
+          .object("start_pose", AT(input.start_pose),
+                  "start of the tasks; default: the robot's position, else the origin", pose_input())
+          .object("charger", AT(input.charger),
+                  "charger at which the plan ends: reached by a turn and a straight line, its length times "
+                  "detour_factor",
+                  charger)
+          .number("to_charger_m", AT(input.to_charger_m), charger_way_m,
+                  "distance from the start to the charger, if its position is not given")
+          .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
+            context.input = &request.input;
+          })
+          .list("tasks", AT(input.tasks), tasks_of_autonomy,
+                "tasks in the order of execution; null or absent: no task forecast", task_input(),
+                Presence::optional);
+  return input;
+}
+
+using described::Table;
+using forecast::Outlook;
+using forecast::TaskOutlook;
+
+const Table<TaskOutlook>& stage_table() {
+  using S = TaskOutlook;
+  static const auto table =
+      Table<S>()
+          .number_or_null("expected_energy_j", &S::mean_j, "mean of the distribution of this leg's energy")
+          .number_or_null("ends_after_s", &S::duration_s, "expected time from now to its end")
+          .number_or_null("success_probability", &S::probability,
+                          "probability that the reserve is not used until its end")
+          .object("energy_since_start_j", &S::energy_j, "energy from now at the quantiles 5, 50 and 95 %",
+                  quantiles_table())
+          .object("arrival_charge", &S::charge, "charge when it ends at the quantiles 5, 50 and 95 %",
+                  quantiles_table());
+  return table;
+}
+
+struct PlannedTask {
+  const TaskOutlook& stage;
+  const std::string& task_id;
+};
+
+// A task; its members are null for the way to the charger.
+struct Place {
+  std::optional<std::size_t> task;
+  std::optional<std::string> task_id;
+};
+
+struct LatestDeparture {
+  const forecast::Departure& leave;
+  double confidence;
+};
+
+struct PlanAnswer {
+  const Outlook& outlook;
+  const AutonomyInput& input;
+};
+
+std::vector<PlannedTask> planned_tasks(const PlanAnswer& plan) {
+  std::vector<PlannedTask> tasks;
+  for (std::size_t k = 0; k < plan.outlook.tasks.size(); ++k)
+    tasks.push_back({plan.outlook.tasks[k], plan.input.tasks[k].task_id});
+  return tasks;
+}
+
+auto place(std::optional<std::size_t> Outlook::*member) {
+  return [member](const PlanAnswer& plan) -> std::optional<Place> {
+    const std::optional<std::size_t>& index = plan.outlook.*member;
+    if (!index) return std::nullopt;
+    if (*index >= plan.input.tasks.size()) return Place{};
+    return Place{*index, plan.input.tasks[*index].task_id};
+  };
+}
+
+std::optional<LatestDeparture> latest_departure(const PlanAnswer& plan) {
+  if (!plan.outlook.latest_departure) return std::nullopt;
+  return LatestDeparture{*plan.outlook.latest_departure, plan.input.confidence};
+}
+
+const Table<PlanAnswer>& plan_table() {
+  static const auto departure =
+      Table<LatestDeparture>()
+          .value("after_tasks", AT(leave.after_tasks),
+                 "number of tasks before the departure; 0: immediate departure")
+          .number_or_null("at_s", AT(leave.at_s), "expected time from now when they are done")
+          .number_or_null("wait_s", AT(leave.wait_s), "permitted waiting time there")
+          .number_or_null(
+              "latest_s", [](const LatestDeparture& d) { return d.leave.at_s + d.leave.wait_s; },
+              "at_s + wait_s")
+          .number_or_null("probability", AT(leave.probability),
+                          "probability of reaching the charger with the reserve when leaving at at_s")
+          .number_or_null("confidence", &LatestDeparture::confidence, "as requested");
+  static const auto leg = Table<PlannedTask>()
+                              .value("task_id", AT(task_id), "the caller's name of the task")
+                              .include(stage_table(), AT(stage));
+  static const auto task = Table<Place>()
+                               .value("task", &Place::task, "index into tasks; null: the way to the charger")
+                               .value("task_id", &Place::task_id, "null: the way to the charger");
+  using P = PlanAnswer;
+  static const auto table =
+      Table<P>()
+          .number_or_null("success_probability", AT(outlook.probability),
+                          "probability of finishing all tasks and reaching the charger with the reserve")
+          .number_or_null("expected_energy_j", AT(outlook.mean_j),
+                          "mean of the distribution with the quantiles energy_j")
+          .number_or_null("duration_s", AT(outlook.duration_s[1]), "median")
+          .object("energy_j", AT(outlook.energy_j), "total energy at the quantiles 5, 50 and 95 %",
+                  quantiles_table())
+          .object(
+              "duration_quantiles_s", AT(outlook.duration_s),
+              "total duration at the quantiles 5, 50 and 95 %; all equal if the plan states the pace and all "
+              "dwells",
+              quantiles_table())
+          .list("legs", planned_tasks, "one per task", leg)
+          .object("charger", AT(outlook.charger), "the way to the charger after the last task", stage_table())
+          .object("fails_at", place(&Outlook::fails_at),
+                  "first task at which use of the reserve is more likely than not; null: none", task)
+          .object("likeliest_failure", place(&Outlook::likeliest_failure),
+                  "task at which use of the reserve most likely begins; null: none", task)
+          .object("latest_departure", latest_departure,
+                  "last moment to leave for the charger; null: no charger given, or too late already",
+                  departure);
+  return table;
+}
+
+Quantiles charge_at_end(const Outlook& outlook) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  return outlook.charger         ? outlook.charger->charge
+         : outlook.tasks.empty() ? Quantiles{none, none, none}
+                                 : outlook.tasks.back().charge;
+}
+
+const Table<Outlook>& end_table() {
+  static const auto table =
+      Table<Outlook>()
+          .number_or_null("success_probability", &Outlook::probability, "probability that the charge lasts")
+          .number_or_null("expected_energy_j", &Outlook::mean_j, "mean of the forecast's distribution")
+          .number_or_null("duration_s", AT(duration_s[1]), "of the tasks")
+          .object("arrival_charge", charge_at_end, "charge at the end at the quantiles 5, 50 and 95 %",
+                  quantiles_table());
+  return table;
+}
+
+struct AutonomyAnswer {
+  const AutonomyRequest& request;
+  const AutonomyOutput& output;
+  const RobotOutlook& robot;
+  const LiveRobot& now;
+
+  // For what is known of the live charge only.
+  LiveRobot charging() const { return output.charge_is_live ? now : LiveRobot{}; }
+  const forecast::Pace& pace() const {
+    const bool reached = output.limitation && request.input.driving != Driving::minimum_energy;
+    return reached ? output.limitation->reached : output.pace;
+  }
+  const forecast::Forecaster& forecaster() const { return *robot.forecaster; }
+  const forecast::Forecaster::Track& track() const {
+    const bool stated = output.track == forecast::Driving::stated;
+    return forecaster().track(stated ? forecast::Subject::stated_energy : forecast::Subject::usual_energy);
+  }
+};
+
+std::optional<std::string_view> charging_phase(const AutonomyAnswer& a) {
+  const battery::ChargingPhase phase = a.charging().charging;
+  return battery::at_charger(phase) ? std::optional(battery::name(phase)) : std::nullopt;
+}
+
+std::string_view driven(const AutonomyAnswer& a) {
+  if (a.request.input.driving == Driving::minimum_energy) return "minimum_energy";
+  return a.output.track == forecast::Driving::stated ? "stated" : "usual";
+}
+
+std::string_view basis(const AutonomyAnswer& a) {
+  const forecast::Forecaster& forecaster = a.forecaster();
+  return forecaster.missions > 0 ? "recent_missions" : forecaster.siblings > 0 ? "siblings" : "model";
+}
+
+const Table<AutonomyAnswer>& pace_table() {
+  using A = AutonomyAnswer;
+  static const auto table =
+      Table<A>()
+          .number_or_null(
+              "speed_m_s", [](const A& a) { return a.pace().speed_m_s; },
+              "forward speed; negative: backwards")
+          .number_or_null(
+              "acceleration_m_s2", [](const A& a) { return a.pace().acceleration_m_s2; },
+              "forward acceleration")
+          .number_or_null(
+              "yaw_rate_rad_s", [](const A& a) { return a.pace().yaw_rate_rad_s; },
+              "rate of turning, positive to the left")
+          .number_or_null(
+              "pause_s", [](const A& a) { return a.pace().pause_s; },
+              "mean time at rest after a leg, with 0 for legs without a halt")
+          .value(
+              "limitation",
+              [](const A& a) {
+                return a.output.limitation ? std::optional(a.output.limitation->sentence) : std::nullopt;
+              },
+              "sentence present if the motors, within the robot's current limit and its battery's nominal "
+              "voltage, do not reach the pace; the other members then contain the pace that they reach, or "
+              "0, without range and plan, if they cannot move the robot");
+  return table;
+}
+
+const Table<AutonomyAnswer>& consumption_table() {
+  using A = AutonomyAnswer;
+  static const auto table =
+      Table<A>()
+          .word("basis", basis, std::array{"recent_missions", "siblings", "model"},
+                "data on which the forecast is based")
+          .value(
+              "missions", [](const A& a) { return a.forecaster().missions; },
+              "number of this robot's missions used for the forecast")
+          .value(
+              "siblings", [](const A& a) { return a.forecaster().siblings; },
+              "number of robots with equal body and motors used for the forecast")
+          .value("siblings_pending", AT(robot.siblings_pending),
+                 "the daemon has started and still reads missions of its siblings: the forecast will improve")
+          .number_or_null("energy_per_m_j", AT(output.reach.energy_per_m_j),
+                          "median consumption over the range: usable_energy_j / range_m")
+          .number_or_null("mean_power_w", AT(output.reach.mean_power_w),
+                          "median power over the run time: usable_energy_j / run_time_s")
+          .number_or_null(
+              "common_deviation", [](const A& a) { return a.track().inflation * a.track().common; },
+              "relative standard deviation that all legs of a mission share")
+          .number_or_null(
+              "leg_deviation",
+              [](const A& a) {
+                return a.track().inflation *
+                       a.track().scatter[static_cast<std::size_t>(forecast::Motion::drive)];
+              },
+              "relative standard deviation of each driven leg, independent of the other legs");
+  return table;
+}
+
+// Under the model in force.
+std::optional<drift::Mark> drift_of(const AutonomyAnswer& a) {
+  const std::optional<drift::Mark>& change = a.forecaster().change;
+  return change && change->model_version == a.robot.model->version ? change : std::nullopt;
+}
+
+// The same plan in another driving, and the difference.
+struct Comparison {
+  const Outlook& best;
+  const Outlook& usual;
+};
+
+std::optional<Comparison> minimum_energy(const AutonomyAnswer& a) {
+  if (!a.output.minimum_energy_outlook || !a.output.outlook) return std::nullopt;
+  return Comparison{*a.output.minimum_energy_outlook, *a.output.outlook};
+}
+
+const Table<Comparison>& comparison_table() {
+  using C = Comparison;
+  static const auto table =
+      Table<C>()
+          .include(end_table(), AT(best))
+          .number_or_null(
+              "saved_j", [](const C& c) { return c.usual.mean_j - c.best.mean_j; },
+              "energy saved compared with usual driving")
+          .number_or_null(
+              "saved_s", [](const C& c) { return c.usual.duration_s[1] - c.best.duration_s[1]; },
+              "time saved; negative: longer duration");
+  return table;
+}
+
+const Table<AutonomyAnswer>& autonomy_table() {
+  using A = AutonomyAnswer;
+  static const auto fastest =
+      Table<FastestDriving>()
+          .value("value_of_time_w", &FastestDriving::value_of_time_w,
+                 "value of time with which profiles and estimates reproduce this driving")
+          .include(end_table(), &FastestDriving::outlook);
+  static const auto table =
+      Table<A>("Remaining range and run time of a robot")
+          .named("robot-autonomy")
+          .include(model_table(), [](const A& a) -> const ModelInForce& { return *a.robot.model; })
+          .value("state_of_charge", AT(output.charge.fraction), "state of charge of the forecast, 0 to 1")
+          .number_or_null("state_of_charge_sd", AT(output.charge.deviation),
+                          "standard deviation; 0 if not available")
+          .text_or_null(
+              "state_of_charge_limitation", [](const A& a) { return a.charging().charge_limitation; },
+              "why the standard deviation is large, as a sentence; null: no such reason, or the request "
+              "states the charge")
+          .value("reserve_fraction", AT(output.charge.reserve), "reserved share of the charge")
+          .word("charging", charging_phase, std::array{"constant_current", "taper", "full"},
+                "present charging phase; null: not charging, or the request states the charge")
+          .number_or_null(
+              "time_to_charged_s", [](const A& a) { return a.charging().to_full.duration_s; },
+              "time until the end of charging, if charging starts now; null: its charging current is "
+              "unknown, or the request states the charge")
+          .number_or_null(
+              "time_to_charged_sd_s", [](const A& a) { return a.charging().to_full.sd_s; },
+              "standard deviation of time_to_charged_s")
+          .number_or_null("usable_energy_j", AT(output.reach.usable_j),
+                          "energy at the terminals above the reserve and the cut-off voltage")
+          .number_or_null("usable_energy_sd_j", AT(output.reach.usable_deviation_j),
+                          "standard deviation of usable_energy_j")
+          .number_or_null("payload_kg", AT(output.payload_kg), "payload of the forecast")
+          .word("driving", driven, std::array{"usual", "stated", "minimum_energy"},
+                "stated: at the pace of the request")
+          .object("pace", std::identity(), "usual driving of the robot; null: not available", pace_table())
+          .object("consumption", std::identity(), "expected consumption", consumption_table())
+          .number_or_null("range_m", AT(output.reach.range_m[1]), "median")
+          .number_or_null("run_time_s", AT(output.reach.run_time_s[1]), "median")
+          .object("range_quantiles_m", AT(output.reach.range_m),
+                  "remaining range with driving as in its recent legs; at the quantiles 5, 50 and 95 %",
+                  quantiles_table())
+          .object("run_time_quantiles_s", AT(output.reach.run_time_s),
+                  "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
+          .object("drift", drift_of,
+                  "the last change of the robot under this model, as in its gap history; null: none",
+                  mark_table())
+          .object(
+              "plan",
+              [](const A& a) -> std::optional<PlanAnswer> {
+                if (!a.output.outlook) return std::nullopt;
+                return PlanAnswer{*a.output.outlook, a.request.input};
+              },
+              "null without tasks and charger", plan_table())
+          .object("minimum_energy", minimum_energy,
+                  "the same plan driven by minimum-energy profiles; null: not requested, or no such profile "
+                  "exists",
+                  comparison_table())
+          .object(
+              "fastest", AT(output.fastest),
+              "the plan driven as fast as the reserve allows with at least the requested confidence; null: "
+              "not requested, or even minimum-energy profiles do not keep it",
+              fastest);
+  return table;
+}
+
+}  // namespace
+
+bool AutonomyRequest::former() const {
+  return std::ranges::any_of(input.tasks, AT(way.former));
+}
+
+described::Schemas autonomy_schemas() {
+  described::Schema task = task_input().schema();
+  for (const std::string_view name : what_to_do) task["anyOf"].push_back({{"required", {name}}});
+  const described::Schema any{
+      {"title", "Remaining range and run time of a robot, and feasibility of a list of tasks"},
+      {"anyOf", {autonomy_table().of_member(), described::of_reference("battery-status")}}};
+  return {{"autonomy-request", autonomy_input().schema()},
+          {"task", std::move(task)},
+          {"autonomy", any},
+          {"battery-status", battery_status_schema()},
+          {"robot-autonomy", autonomy_table().schema()}};
+}
+
+Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, const std::string& at) {
+  AutonomyRequest request;
+  request.input.compare_minimum_energy = single;
+  AutonomyContext context;
+  context.payload_limit_kg = payload_kg_bounds.maximum;
+  context.may_stand = true;
+  return autonomy_input().read(body, std::move(request), context, at);
+}
+
+std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& a, const RobotOutlook& robot,
+                          const LiveRobot& now) {
+  if (request.dialect != Dialect::joulecast) {
+    return battery_dialect(
+        request.dialect, battery_status(robot.model->robot.battery, *robot.battery, a.charge, a.reach, now));
+  }
+  return autonomy_table().text({request, a, robot, now});
+}
+
+Result<std::string> autonomy_text(const AutonomyRequest& request, const RobotOutlook& robot,
+                                  const LiveRobot& now, planning::CostTableCache& tables,
+                                  const std::stop_token& stop) {
+  TRY_ASSIGN(const auto plan, task_plan(request.input, now));
+  TRY_ASSIGN(const auto output, autonomy(request.input, plan, robot, now, tables, stop));
+  return autonomy_json(request, output, robot, now);
+}
+
+Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
+                                    const LiveRobot& now, planning::CostTableCache& tables) {
+  TRY_ASSIGN(const AutonomyRequest read, read_autonomy(request, true));
+  return autonomy_text(read, robot, now, tables);
 }
 
 }  // namespace joulecast::answers

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
+#include "answers/mission.h"
 #include "answers/profile.h"
 #include "base/try.h"
 #include "forecast/outlook.h"
@@ -140,6 +142,204 @@ Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& 
   const auto& drive = std::get<DriveInput>(input.motion);
   if (input.driving == Driving::usual) return of_habit(drive, robot);
   return of_optimum(drive, input.columns, *robot.model, stop);
+}
+
+namespace {
+
+using Json = nlohmann::json;
+
+using described::Input;
+using described::Presence;
+using described::Table;
+
+// A motion over time.
+struct MotionColumns {
+  std::vector<double> time_s, speed_m_s;
+  std::optional<std::vector<double>> yaw_rate_rad_s, climb_rad, height_m;
+};
+
+// Faults a column of another length than that of the times.
+void check_length(Fields& fields, const char* name, std::size_t times, std::size_t column) {
+  if (fields.ok() && column != times) fields.fault(name, "must have as many entries as time_s");
+}
+void check_length(Fields& fields, const char* name, std::size_t times,
+                  const std::optional<std::vector<double>>& column) {
+  if (column) check_length(fields, name, times, column->size());
+}
+
+const Input<MotionColumns>& columns_input() {
+  constexpr described::Count points{2, 200'000};
+  constexpr Bounds speed{.minimum = -100, .maximum = 100};
+  using Columns = MotionColumns;
+  static const auto input =
+      Input<Columns>({}, "speeds are linear in between")
+          .numbers("time_s", &Columns::time_s, points, {.minimum = 0, .maximum = 1e7}, "times, ascending")
+          .numbers("speed_m_s", &Columns::speed_m_s, points, speed, "forward speed; negative: backwards")
+          .numbers("yaw_rate_rad_s", &Columns::yaw_rate_rad_s, points, speed,
+                   "rate of turning, positive to the left")
+          .check([](Fields& fields, Columns& columns, described::Nothing&) {
+            check_length(fields, "speed_m_s", columns.time_s.size(), columns.speed_m_s.size());
+            check_length(fields, "speed_m_s", columns.time_s.size(), columns.yaw_rate_rad_s);
+          })
+          .numbers("climb_rad", &Columns::climb_rad, points, {.minimum = -0.785, .maximum = 0.785},
+                   "angle of the floor along the heading, nose up positive, linear in between; used if the "
+                   "robot's effects contain grade")
+          .numbers("height_m", &Columns::height_m, points, {.minimum = -1e5, .maximum = 1e5},
+                   "height above any fixed datum, linear between two points; replaces climb_rad")
+          .check([](Fields& fields, Columns& columns, described::Nothing&) {
+            if (columns.climb_rad && columns.height_m)
+              fields.fault("climb_rad", "must not be combined with height_m, from which it follows");
+            check_length(fields, "climb_rad", columns.time_s.size(), columns.climb_rad);
+            check_length(fields, "height_m", columns.time_s.size(), columns.height_m);
+          });
+  return input;
+}
+
+std::vector<energy::MotionPoint> points_of(const MotionColumns& columns) {
+  std::vector<energy::MotionPoint> points;
+  points.reserve(columns.time_s.size());
+  const auto at = [](const std::optional<std::vector<double>>& column, std::size_t k, double absent) {
+    return column ? (*column)[k] : absent;
+  };
+  for (std::size_t k = 0; k < columns.time_s.size(); ++k)
+    points.push_back({columns.time_s[k], columns.speed_m_s[k], at(columns.yaw_rate_rad_s, k, 0),
+                      at(columns.climb_rad, k, dynamics::unknown),
+                      at(columns.height_m, k, dynamics::unknown)});
+  return points;
+}
+
+GivenMotion& given_motion(EstimateInput& input) {
+  if (!std::holds_alternative<GivenMotion>(input.motion)) input.motion.emplace<GivenMotion>();
+  return std::get<GivenMotion>(input.motion);
+}
+
+// Rejects members that apply only to a planned motion.
+void check_usual(Fields& fields, const EstimateInput& input, PathContext&) {
+  if (input.driving != Driving::usual) return;
+  if (input.columns)
+    fields.fault("columns", "must be false beside \"driving\": \"usual\", which is not planned");
+  refuse_beside_usual(fields, {"deadline_s", "value_of_time_w", "start_speed_m_s", "end_speed_m_s",
+                               "regeneration", "limits"});
+}
+
+}  // namespace
+
+const Input<EstimateInput, PathContext>& estimate_input() {
+  using Part = Input<EstimateInput, PathContext>;
+  static const auto given =
+      Part()
+          .object(
+              "profile",
+              [](EstimateInput& input, const MotionColumns& columns) {
+                given_motion(input).points = points_of(columns);
+              },
+              {}, columns_input())
+          .number(
+              "payload_kg", [](EstimateInput& input) -> double& { return given_motion(input).payload_kg; },
+              not_negative, "at the start", 0,
+              [](const EstimateInput&, const PathContext& context) { return context.payload_limit_kg; })
+          .object(
+              "start_pose",
+              [](EstimateInput& input, const planning::Pose& pose) {
+                given_motion(input).start = {pose.x_m, pose.y_m, pose.heading_rad};
+              },
+              "start of the motion; default for a path: the origin", pose_input(), Presence::optional);
+  static const auto planned =
+      Part()
+          .choice("driving", &EstimateInput::driving, driving_names,
+                  "driving model of a path. minimum_energy: its minimum-energy motion, as returned by the "
+                  "profile operation and independent of the robot's history; usual: the robot's own pace and "
+                  "the consumption estimated from its missions, for robots that do not drive the planner's "
+                  "profile. deadline_s, value_of_time_w, end speeds, limits, regeneration and columns are "
+                  "valid only with minimum_energy",
+                  static_cast<std::size_t>(Driving::minimum_energy))
+          .include(drive_input(),
+                   [](EstimateInput& input) -> DriveInput& { return std::get<DriveInput>(input.motion); })
+          .check(check_usual);
+  static const auto input =
+      Part("A motion to estimate: a profile, or a path")
+          .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)
+          .either(given, planned);
+  return input;
+}
+
+Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel& robot) {
+  return estimate_input().read(request, {.motion = undriven(robot)}, {robot.limits.payload_kg});
+}
+
+namespace {
+
+struct EstimateAnswer {
+  const EstimateInput& input;
+  const EstimateOutput& output;
+  const ModelInForce& model;
+};
+
+const Table<EstimateAnswer>& estimate_table() {
+  using planning::BrokenLimit;
+  static const auto broken =
+      Table<BrokenLimit>()
+          .word("limit", &BrokenLimit::limit,
+                std::array{"speed", "acceleration", "yaw_rate", "wheel_speed", "current", "voltage"},
+                "the exceeded limit")
+          .value("reached", &BrokenLimit::reached,
+                 "greatest value of the motion, in the limit's unit: m/s, m/s^2, rad/s, rad/s, A, V")
+          .value("allowed", &BrokenLimit::allowed, "the limit");
+  using A = EstimateAnswer;
+  static const auto table =
+      Table<A>("Energy and ledger of a motion")
+          .include(model_table(), AT(model))
+          .word(
+              "driving",
+              [](const A& a) -> std::string_view {
+                return std::holds_alternative<GivenMotion>(a.input.motion) ? "given"
+                                                                           : name_of(a.input.driving);
+              },
+              std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
+          .value("energy_j", AT(output.energy_j),
+                 "from the battery; of usual driving the mean of its forecast")
+          .value("duration_s", AT(output.duration_s), "from start to end")
+          .value("distance_m", AT(output.distance_m), "driven distance, forward and backward both positive")
+          .value("turned_rad", AT(output.turned_rad), "turned angle, both senses positive")
+          .object("energy_quantiles_j", AT(output.energy_quantiles_j),
+                  "of usual driving, the forecast of energy_j; else null", quantiles_table())
+          .value("siblings_pending", [](const A&) { return true; },
+                 "of usual driving while a started daemon still reads missions of its siblings: the forecast "
+                 "will improve",
+                 {{"const", true}})
+          .only(AT(output.siblings_pending))
+          .list(
+              "beyond_limits", AT(output.beyond_limits),
+              "limits of the robot that the given motion exceeds: speeds by more than 1e-6 of the limit; "
+              "acceleration, current and voltage, which are computed from the slope of rounded speeds, by "
+              "more than 0.0015 of it, current and voltage only while a wheel turns at 0.05 rad/s or faster. "
+              "Empty for a path: its plan satisfies the limits",
+              broken)
+          .object("ledger", AT(output.accounts), "null for usual driving: its forecast has no terms",
+                  ledger_table())
+          .object(
+              "profile", [](const A& a) -> const auto& { return *a.output.columns; },
+              "the motion over time, if columns are requested; positions are null without start_pose",
+              columns_table(true))
+          .only([](const A& a) { return a.output.columns.has_value(); });
+  return table;
+}
+
+}  // namespace
+
+described::Schemas estimate_schemas() {
+  return {{"estimate-request", estimate_input().schema()}, {"estimate", estimate_table().schema()}};
+}
+
+std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
+                          const ModelInForce& model) {
+  return estimate_table().text({input, output, model});
+}
+
+Result<std::string> estimate_answer(const Json& request, const RobotOutlook& robot) {
+  TRY_ASSIGN(const auto input, read_estimate(request, robot.model->robot));
+  TRY_ASSIGN(const auto output, estimate(input, robot));
+  return estimate_json(input, output, *robot.model);
 }
 
 }  // namespace joulecast::answers

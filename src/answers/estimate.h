@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -41,5 +43,15 @@ struct EstimateOutput {
 // A stop ends planning with Fault::stopped.
 Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot,
                                 const std::stop_token& stop = {});
+
+// "estimate-request" and "estimate".
+described::Schemas estimate_schemas();
+// Errors name the field.
+Result<EstimateInput> read_estimate(const nlohmann::json& request, const robot::RobotModel& robot);
+std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
+                          const ModelInForce& model);
+
+// From request to answer.
+Result<std::string> estimate_answer(const nlohmann::json& request, const RobotOutlook& robot);
 
 }  // namespace joulecast::answers

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "answers/drive.h"
 #include "answers/model.h"
+#include "describe/schema.h"
 #include "planning/cost_matrix.h"
 #include "planning/cost_table_cache.h"
 
@@ -77,6 +79,25 @@ class Matrix {
  private:
   struct State;
   std::unique_ptr<State> state_;
+};
+
+// "energy-matrix-request", "energy-matrix" and those to which they refer.
+described::Schemas matrix_schemas();
+// Errors name the field; too many cells are Fault::too_large.
+Result<MatrixInput> read_matrix(const nlohmann::json& request);
+
+// The answer, written piece by piece.
+class MatrixText {
+ public:
+  explicit MatrixText(Matrix matrix) : matrix_(std::move(matrix)) {}
+
+  // Appends the next piece; false after the last one, or when `left` is set. Works on two threads.
+  bool next(std::string& out, const std::stop_token& left);
+
+ private:
+  Matrix matrix_;
+  bool begun_ = false;
+  std::size_t rows_done_ = 0;
 };
 
 }  // namespace joulecast::answers

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "answers/drive.h"
@@ -45,5 +47,14 @@ std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const Mo
 // The same without the comparisons. With another regeneration than the model's a planner is made.
 Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model,
                             const std::stop_token& stop = {});
+
+// "profile-request" and "profile".
+described::Schemas profile_schemas();
+// Errors name the field.
+Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot);
+std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model);
+
+// From request to answer.
+Result<std::string> profile_answer(const nlohmann::json& request, const ModelInForce& model);
 
 }  // namespace joulecast::answers

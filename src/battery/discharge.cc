@@ -22,9 +22,9 @@ enum : std::size_t {
   size
 };
 
-enum : std::size_t { voltage_event, charge_event, power_event, event_count };
+enum : std::size_t { voltage_event, power_event, event_count };
 
-constexpr Ending endings[event_count] = {Ending::voltage, Ending::charge, Ending::power};
+constexpr Ending endings[event_count] = {Ending::voltage, Ending::power};
 
 class Problem final : public energy::InitialValueProblem {
  public:
@@ -32,7 +32,6 @@ class Problem final : public energy::InitialValueProblem {
       : circuit_(circuit),
         kind_(kind),
         voltage_limit_v_(limits.voltage_v.value_or(circuit.cutoff_voltage_v())),
-        charge_limit_(limits.charge),
         ambient_c_(limits.ambient_c) {}
 
   void set_piece(const Load::Piece& piece, double began_s) {
@@ -81,7 +80,6 @@ class Problem final : public energy::InitialValueProblem {
   void events(double t, std::span<const double> y, std::span<double> value) const override {
     const State state = unpacked(y);
     value[voltage_event] = circuit_.voltage_v(state, current_a(t, state)) - voltage_limit_v_;
-    value[charge_event] = charge_limit_ ? state.charge - *charge_limit_ : 1;
     value[power_event] = 1;
     if (kind_ == Load::Kind::power) {
       const double most = circuit_.most_power_w(state);
@@ -93,8 +91,8 @@ class Problem final : public energy::InitialValueProblem {
   std::optional<std::size_t> event_at(double t, std::span<const double> y) const {
     double values[battery::event_count];
     events(t, y, values);
-    // Insufficient power takes precedence over the voltage and the charge.
-    for (const std::size_t event : {power_event, voltage_event, charge_event})
+    // Insufficient power takes precedence over the voltage.
+    for (const std::size_t event : {power_event, voltage_event})
       if (values[event] < 0) return event;
     return std::nullopt;
   }
@@ -103,7 +101,6 @@ class Problem final : public energy::InitialValueProblem {
   const Circuit& circuit_;
   Load::Kind kind_;
   double voltage_limit_v_;
-  std::optional<double> charge_limit_;
   double ambient_c_;
   Load::Piece piece_{1, 0, 0};
   double began_s_ = 0;

@@ -31,14 +31,12 @@ Result<Load> held_load(Load::Kind kind, std::span<const double> time_s, std::spa
 // Where a discharge stops, besides the end of its load.
 struct DischargeLimits {
   std::optional<double> voltage_v;  // default: the battery's cut-off
-  std::optional<double> charge;     // e.g. the reserve; default: none
   double ambient_c = reference_temperature_c;
 };
 
 enum class Ending {
   load_ended,
   voltage,  // terminals fell to the voltage limit
-  charge,   // charge fell to its limit
   power     // the battery cannot deliver the requested power
 };
 
@@ -54,7 +52,7 @@ struct Discharge {
 };
 
 // Follows the circuit under the load with CVODE, restarted at each piece, and finds the end by its roots.
-// The duration is the time to cut-off or reserve with the corresponding ending. Errors: a non-finite start.
+// The duration is the time to the ending. Errors: a non-finite start.
 Result<Discharge> discharge(const Circuit& circuit, const State& start, const Load& load,
                             const DischargeLimits& limits = {});
 

@@ -79,8 +79,7 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
   Load continued = recorded;
   const double last = continued.pieces.back().end;
   continued.pieces.push_back({recording.duration_s(), last, last});
-  TRY_ASSIGN(const auto to_end,
-             discharge(circuit, start, continued, {out.end_voltage_v, std::nullopt, ambient_c}));
+  TRY_ASSIGN(const auto to_end, discharge(circuit, start, continued, {out.end_voltage_v, ambient_c}));
   if (to_end.ending == Ending::load_ended)
     return fail(Fault::infeasible, recording.name,
                 fmt::format("still at {:.3f} V after twice the recorded time; the recording ends at {:.3f} V",
@@ -89,7 +88,7 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
   out.time_error = out.predicted_s / out.measured_s - 1;
 
   // Voltages go on below the end voltage, so that a discharge predicted too short is compared in full.
-  TRY_ASSIGN(const auto through, discharge(circuit, start, recorded, {0.0, std::nullopt, ambient_c}));
+  TRY_ASSIGN(const auto through, discharge(circuit, start, recorded, {0.0, ambient_c}));
   std::vector<double> terminal_v{circuit.inner_voltage_v(start)};
   terminal_v.insert(terminal_v.end(), through.terminal_v.begin(), through.terminal_v.end());
   out.voltage_rms_v = rms_above_least_charge(recording, terminal_v, recording.charge_ah());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <concepts>
 #include <functional>
 #include <optional>
@@ -201,13 +202,18 @@ class Input {
       table.read(fields, std::invoke(target, object), context);
     });
   }
-  // The members of one table where `name` is given, else those of the other.
-  Input& either(const char* name, const Input& with, const Input& without) {
+  // The members of one table where one is given that the other lacks, else those of the other.
+  Input& either(const Input& with, const Input& without) {
+    std::vector<std::string> own;
+    for (const auto& [name, schema] : with.properties_.items())
+      if (!without.properties_.contains(name)) own.push_back(name);
     properties_.update(with.properties_);
     for (const auto& [other, schema] : without.properties_.items())
       if (!properties_.contains(other)) properties_[other] = schema;
     return row([=](Fields& fields, T& object, Context& context) {
-      (fields.member(name) != nullptr ? with : without).read(fields, object, context);
+      const bool stated =
+          std::ranges::any_of(own, [&](const std::string& name) { return fields.member(name) != nullptr; });
+      (stated ? with : without).read(fields, object, context);
     });
   }
   // A constraint between members, of which those above are read.

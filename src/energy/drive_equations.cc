@@ -1,6 +1,5 @@
 #include "energy/drive_equations.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>

@@ -244,7 +244,7 @@ Result<void> Meter::integrate_to(const Node& node, double interval_s) {
     // No motor reaches this heat: its readings are impossible.
     copper_heat_w_ = {};
     skip_gap(interval_s);
-    return fail(Fault::internal, "erkstep", "the accounts are not finite");
+    return fail(Fault::invalid, "model", "the power of the recorded motion is not finite");
   }
   book(increment, to.coverage, interval_s);
   if (!integrated) return tl::unexpected(integrated.error());

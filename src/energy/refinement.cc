@@ -199,6 +199,8 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   Eigen::Map<Kept>(mission.value.data()) = file + alone.value.head<m>();
   Eigen::Map<KeptSquare>(mission.covariance.data()) = alone.covariance.topLeftCorner<m, m>();
 
+  // Of a log that is replayed again.
+  if (std::erase_if(learned_, [&](const auto& one) { return one.utime_us == utime_us; }) > 0) relearn();
   MissionFinding out = step(mission, learn);
   out.equations = equations.size();
   out.enough = true;

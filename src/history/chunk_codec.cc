@@ -2,7 +2,6 @@
 
 #include <zstd.h>
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>

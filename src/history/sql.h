@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/core/noncopyable.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <forward_list>
@@ -43,14 +44,11 @@ class SqlError : public std::runtime_error {
 };
 
 // A prepared statement. Runs through Rows, one at a time. Parameters and columns count from 0.
-class Statement {
+class Statement : boost::noncopyable {
  public:
   enum class Type { null, integer, real, text, blob };
 
-  Statement() = default;
   virtual ~Statement() = default;
-  Statement(const Statement&) = delete;
-  Statement& operator=(const Statement&) = delete;
 
   virtual void bind_null(int parameter) = 0;
   virtual void bind(int parameter, std::int64_t value) = 0;
@@ -80,10 +78,7 @@ class Database {
  public:
   enum class Access { read, write };
 
-  Database() = default;
   virtual ~Database() = default;
-  Database(const Database&) = delete;
-  Database& operator=(const Database&) = delete;
 
   // Runs statements that give no rows worth reading.
   virtual void execute(const std::string& sql) = 0;
@@ -122,7 +117,7 @@ class Database {
 // One run of a statement: bind its parameters left to right, then step; read a row's columns left to right.
 // Resets the statement at the end of its scope. Text and blobs bound must outlive it, but for temporary
 // strings.
-class Rows {
+class Rows : boost::noncopyable {
  public:
   explicit Rows(Statement& statement) : statement_(statement) {}
   // Of the kept statement of that text, with these parameters.
@@ -131,8 +126,6 @@ class Rows {
     (bind(std::forward<Values>(values)), ...);
   }
   ~Rows() { statement_.reset(); }
-  Rows(const Rows&) = delete;
-  Rows& operator=(const Rows&) = delete;
 
   Rows& bind(std::int64_t value);
   Rows& bind(bool value) { return bind(std::int64_t{value}); }
@@ -172,12 +165,10 @@ class Rows {
 };
 
 // Rolls back at the end of its scope unless committed.
-class Transaction {
+class Transaction : boost::noncopyable {
  public:
   Transaction(Database& database, Database::Access access) : database_(database) { database.begin(access); }
   ~Transaction();
-  Transaction(const Transaction&) = delete;
-  Transaction& operator=(const Transaction&) = delete;
 
   void commit() { database_.commit(); }
 

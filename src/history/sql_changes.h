@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "history/bulk_rows.h"
 #include "history/commands.h"
 #include "history/mission_days.h"
 #include "history/sql.h"
+#include "history/sql_rows.h"
 #include "history/store.h"
 
 namespace joulecast::history {

@@ -6,7 +6,7 @@
 
 #include "base/try.h"
 #include "history/chunk_codec.h"
-#include "history/cursor.h"
+#include "history/sql_filter.h"
 
 namespace joulecast::history::chunks {
 namespace {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,5 +49,15 @@ class Where {
   std::vector<std::string> states_;
   std::string sql_ = " WHERE TRUE";
 };
+
+// A place in an ordered result: two numbers with a meaning that depends on the query.
+using CursorPlace = std::array<std::int64_t, 2>;
+
+// `query` is any text that distinguishes queries; its fingerprint goes into the cursor. The result is
+// URL-safe.
+std::string encode_cursor(std::string_view query, CursorPlace place);
+
+// Fault::invalid on field "cursor" for a malformed cursor or one of another query.
+Result<CursorPlace> decode_cursor(std::string_view query, std::string_view cursor);
 
 }  // namespace joulecast::history

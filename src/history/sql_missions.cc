@@ -1,11 +1,9 @@
 // Queries of missions: filters, orders, pages and sums.
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <utility>
 
 #include "base/try.h"
-#include "history/cursor.h"
 #include "history/mission_days.h"
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"

@@ -38,8 +38,6 @@ class ReaderPool {
     Lease(ReaderPool& pool, std::unique_ptr<Database> database)
         : pool_(pool), database_(std::move(database)) {}
     ~Lease() { pool_.give_back(std::move(database_)); }
-    Lease(const Lease&) = delete;
-    Lease& operator=(const Lease&) = delete;
     Database& operator*();
 
    private:

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/core/noncopyable.hpp>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -32,12 +33,10 @@ class SqliteDatabase final : public Database {
 };
 
 // Keeps a second program off the same file; the kernel releases it however the process ends.
-class FileLock {
+class FileLock : boost::noncopyable {
  public:
   explicit FileLock(int descriptor) : descriptor_(descriptor) {}
   ~FileLock();
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
 
   // Creates the file if it is missing. Fault::conflict if another program holds the lock; with `names_holder`
   // the file contains its process, which the message names.

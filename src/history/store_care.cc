@@ -3,14 +3,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <utility>
 
 #include "base/host_clock.h"
-#include "base/output_file.h"
+#include "base/text_file.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "history/open_store.h"

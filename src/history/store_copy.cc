@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "base/text.h"
 #include "base/try.h"
 #include "history/audit.h"
 #include "history/chunk_codec.h"
@@ -118,18 +119,18 @@ class Summary {
     } else if (type != Statement::Type::null) {
       const std::string_view bytes = row.bytes(column);
       mix(bytes.size(), 8);
-      for (const char c : bytes) mix(static_cast<unsigned char>(c), 1);
+      hash_ = fnv1a(bytes, hash_);
       sum_.value_bytes += static_cast<std::int64_t>(bytes.size());
       return;
     }
     if (type != Statement::Type::null) sum_.value_bytes += 8;
   }
   void mix(std::uint64_t value, unsigned bytes) {
-    for (unsigned k = 0; k < bytes; ++k) hash_ = (hash_ ^ ((value >> (8 * k)) & 0xff)) * 0x100000001b3;
+    hash_ = fnv1a({reinterpret_cast<const char*>(&value), bytes}, hash_);  // the low bytes come first
   }
 
   TableSummary sum_;
-  std::uint64_t hash_ = 0xcbf29ce484222325;
+  std::uint64_t hash_ = fnv1a({});
 };
 
 int index_of(const std::vector<std::string>& columns, std::string_view name) {

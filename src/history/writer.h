@@ -80,9 +80,6 @@ class Writer {
   Writer(Store& store, WriterOptions options);
   ~Writer();  // as stop(retry_last)
 
-  Writer(const Writer&) = delete;
-  Writer& operator=(const Writer&) = delete;
-
   // Queues a command; waits while the queue is full. Fault::unavailable after stop().
   Result<void> post(Command command);
   // Queues a command and never waits, for callers that must continue when the store stalls: a checkpoint is

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -62,5 +64,11 @@ class FleetView {
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<const RobotSnapshot>, std::less<>> latest_;
 };
+
+// A robot's snapshot as the daemons of a cluster hand it on.
+std::vector<std::byte> snapshot_bytes(const RobotSnapshot& snapshot);
+
+// Null for bytes that a version of the program with another layout wrote.
+std::shared_ptr<const RobotSnapshot> snapshot_from_bytes(std::span<const std::byte> bytes);
 
 }  // namespace joulecast::ingest

@@ -235,6 +235,7 @@ history::Learned Forecasts::learn(const std::shared_ptr<const ModelInForce>& mod
   bring_up(slot, model);
   borrow(slot);
   std::erase_if(mission.legs, [](const forecast::Leg& leg) { return !std::isfinite(leg.battery_j); });
+  (void)drop(slot, mission.start_utime_us);  // of a log that is replayed again
   slot.forecast->learn(mission);
   if (!mission.legs.empty()) slot.kept.push_back(std::move(mission));
   while (slot.kept.size() > kept_missions) slot.kept.pop_front();
@@ -270,16 +271,22 @@ history::Learned Forecasts::document_of(const Entry& entry) {
           legs_json(entry.kept)};
 }
 
+// Whether the mission was kept; the forecast is then trained on the others.
+bool Forecasts::drop(Entry& entry, std::int64_t start_utime_us) {
+  const auto is_it = [&](const forecast::PastMission& m) { return m.start_utime_us == start_utime_us; };
+  if (std::erase_if(entry.kept, is_it) == 0) return false;
+  begin(entry);
+  for (const forecast::PastMission& mission : entry.kept) entry.forecast->learn(mission);
+  return true;
+}
+
 std::optional<history::Learned> Forecasts::forget(const std::shared_ptr<const ModelInForce>& model,
                                                   std::int64_t start_utime_us) {
   (void)read(model);
   Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
-  const auto is_it = [&](const forecast::PastMission& m) { return m.start_utime_us == start_utime_us; };
-  if (std::erase_if(slot.kept, is_it) == 0) return std::nullopt;
-  begin(slot);
-  for (const forecast::PastMission& mission : slot.kept) slot.forecast->learn(mission);
+  if (!drop(slot, start_utime_us)) return std::nullopt;
   lend(slot);
   slot.outlook.forecaster = slot.forecast->forecaster();
   return document_of(slot);

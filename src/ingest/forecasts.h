@@ -72,6 +72,7 @@ class Forecasts {
   static history::Learned document_of(const Entry& entry);
   void bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model);
   void begin(Entry& entry);
+  bool drop(Entry& entry, std::int64_t start_utime_us);
   void borrow(Entry& entry);
   void lend(Entry& entry);
 

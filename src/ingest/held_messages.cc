@@ -1,7 +1,6 @@
 #include "ingest/held_messages.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace joulecast::ingest {
 namespace {

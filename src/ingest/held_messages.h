@@ -6,7 +6,6 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "ingest/inbound_message.h"
 #include "ingest/keeping.h"

@@ -1,7 +1,6 @@
 #include "ingest/inbound_message.h"
 
 #include <algorithm>
-#include <bit>
 #include <utility>
 
 #include "ingest/signature_gate.h"

@@ -1,7 +1,6 @@
 #include "ingest/ingest_service.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <utility>
 

@@ -575,11 +575,6 @@ void RobotSession::recall(const MissionRequest& request) {
 void RobotSession::on_request(const MissionRequest& request) {
   if (model_ == nullptr || request.request_utime_us <= snapshot_.mission_request_utime_us) return;
   if (snapshot_.received_utime_us > 0) requested_utime_us_ = request.request_utime_us;
-  // The scheduler knows how a mission ended that was open when the last daemon stopped.
-  const signals::MissionEvent& event = request.event;
-  if (open_ != nullptr && open_->resumed_silent && open_->record.mission_id == event.mission_id &&
-      event.phase != signals::MissionPhase::started)
-    open_->go_on_after_silence(event.utime_us);
   take(request.event, true);
   recall(request);
 }
@@ -602,6 +597,10 @@ void RobotSession::take(const signals::MissionEvent& event, bool requested) {
   release_held();
   if (std::string why = contradiction_of(event, requested); !why.empty())
     return on_fault(IngestFault::bad_event, 1, std::move(why));
+  // The sender knows how a mission ended that was open when the last daemon stopped.
+  if (open_ != nullptr && open_->resumed_silent && open_->record.mission_id == event.mission_id &&
+      event.phase != signals::MissionPhase::started)
+    open_->go_on_after_silence(event.utime_us);
   const telemetry::MissionCounters before = missions_.counters();
   telemetry::MissionActions actions = missions_.on_event(event);
   if (actions.empty()) event_allowance_.give_back();  // robots may repeat themselves

@@ -1,7 +1,6 @@
 #include "ingest/sample_order.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace joulecast::ingest {
 

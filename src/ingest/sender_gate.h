@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/core/noncopyable.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -15,14 +16,12 @@ namespace joulecast::ingest {
 // when the first sender sends again, so that no energy is counted twice; they pass when the first one has
 // fallen silent, so that a robot with a restarted publisher or a changed address loses no data. Messages of
 // unknown senders (logs) have the streams only.
-class SenderGate {
+class SenderGate : boost::noncopyable {
  public:
   // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one
   // sample) that may wait in all gates together.
   SenderGate(std::int64_t takeover_us, std::size_t& room) : takeover_us_(takeover_us), room_(room) {}
   ~SenderGate() { drop_waiting(); }
-  SenderGate(const SenderGate&) = delete;
-  SenderGate& operator=(const SenderGate&) = delete;
 
   struct Verdict {
     std::vector<InboundMessage> released;  // pass first

@@ -57,8 +57,6 @@ class RobotReader {
  public:
   using Read = std::function<Result<StoredRobot>(const std::string& robot_id)>;
   explicit RobotReader(Read read) : read_(std::move(read)) {}
-  RobotReader(const RobotReader&) = delete;
-  RobotReader& operator=(const RobotReader&) = delete;
 
   void start();
   // What was not read yet is read by take().

@@ -21,7 +21,7 @@ class Ramp {
     if (!(duration_s > 0)) return;
     if (loads_.scrubs()) {
       // In parts where scrub builds up.
-      const WheelLoad here = loads_.at(run_, run_.at(std::min(way_, run_.length())), 0)[0];
+      const WheelLoad here = loads_.at(run_, run_.at(std::min(way_, run_.length())))[0];
       if (here.parts(from, to) > 1) {
         const double risen = 5 * here.scrub_speed,
                      cut = std::max(from, to) > 2 * risen ? risen : 0.5 * (from + to),
@@ -99,7 +99,7 @@ class Ramp {
       at_.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, 0, run_.turn * acceleration);
     } else {
       at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, speed * knot.curvature_1_m);
-      const double bend = run_.curvature_slope(knot.way);
+      const double bend = run_.at(knot.way).curvature_slope;
       at_.wheel_acceleration_rad_s2 =
           dynamics::wheels_of_body(p, acceleration, acceleration * knot.curvature_1_m + bend * speed * speed);
     }

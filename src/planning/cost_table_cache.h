@@ -30,7 +30,7 @@ class CostTableCache {
 
   const std::size_t capacity_;
   mutable std::mutex mutex_;
-  std::list<std::pair<std::size_t, Entry>> entries_;  // hash and entry, the latest used first
+  std::list<Entry> entries_;  // the latest used first
 };
 
 }  // namespace joulecast::planning

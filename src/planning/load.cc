@@ -50,23 +50,22 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
   return loads;
 }
 
-Instant DriveLoads::instant(const Run& run, const Knot& knot, double curvature_slope, double speed,
-                            double acceleration) const {
+Instant DriveLoads::instant(const Run& run, const Place& place, double speed, double acceleration) const {
   const auto& p = model_.parameters();
-  const double ahead = run.turn == 0 ? 1 : 0, turn = run.turn == 0 ? knot.curvature_1_m : run.turn;
+  const double ahead = run.turn == 0 ? 1 : 0, turn = run.turn == 0 ? place.curvature_1_m : run.turn;
   const auto pace = dynamics::wheels_of_body(p, ahead, turn);
-  const auto bend = dynamics::wheels_of_body(p, 0, run.turn == 0 ? curvature_slope : 0);
+  const auto bend = dynamics::wheels_of_body(p, 0, run.turn == 0 ? place.curvature_slope : 0);
   Instant at;
   for (std::size_t s : {0u, 1u}) {
     at.wheel_speed_rad_s[s] = pace[s] * speed;
     at.wheel_acceleration_rad_s2[s] = pace[s] * acceleration + bend[s] * speed * speed;
   }
   at.payload_kg = run.payload_kg;
-  at.x_m = knot.pose.x_m, at.y_m = knot.pose.y_m, at.heading_rad = knot.pose.heading_rad;
+  at.x_m = place.pose.x_m, at.y_m = place.pose.y_m, at.heading_rad = place.pose.heading_rad;
   return at;
 }
 
-WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slope) const {
+WheelLoads DriveLoads::at(const Run& run, const Place& place) const {
   using Load = dynamics::Load;
   struct Torques {
     std::array<double, 2> through{}, inside{}, scrub{};
@@ -87,13 +86,13 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     return t;
   };
   const auto torques = [&](double speed, double acceleration) {
-    return torques_at(instant(run, knot, curvature_slope, speed, acceleration));
+    return torques_at(instant(run, place, speed, acceleration));
   };
   // Half of what the direction of rotation changes, extrapolated to standstill from a quadratic.
   const auto dry = [&](std::array<double, 2> Torques::*part, std::size_t s) {
     double sum = 0;
     for (const auto& [speed, weight] : {std::pair{5.0, 1.5}, {10.0, -1.5}, {15.0, 0.5}}) {
-      Instant rolls = instant(run, knot, 0, 0, 0);
+      Instant rolls = instant(run, place, 0, 0);
       for (const double sign : {1.0, -1.0}) {
         rolls.wheel_speed_rad_s = {sign * speed, sign * speed};
         sum += sign * weight * (torques_at(rolls).*part)[s];
@@ -105,7 +104,7 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
   // speeds, well above the creep where dry friction fades, determine the coefficients.
   const Torques slow = torques(0.5, 0), middle = torques(1, 0), fast = torques(1.5, 0),
                 pushed = torques(1, 1);
-  const auto pace = instant(run, knot, 0, 1, 0).wheel_speed_rad_s;
+  const auto pace = instant(run, place, 1, 0).wheel_speed_rad_s;
   const auto fit = [](double y0, double y1, double y2, double& c0, double& c1, double& c2) {
     c2 = 2 * (y0 - 2 * y1 + y2);
     c1 = y2 - y0 - 2 * c2;
@@ -124,7 +123,7 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     std::array<double, 3> inside{slow.inside[s], middle.inside[s], fast.inside[s]},
         through{slow.through[s], middle.through[s], fast.through[s]};
     if (scrub_rate_rad_s_ > 0 && middle.scrub[s] != 0) {
-      w.scrub_speed = scrub_rate_rad_s_ / (run.turn != 0 ? 1 : std::fabs(knot.curvature_1_m));
+      w.scrub_speed = scrub_rate_rad_s_ / (run.turn != 0 ? 1 : std::fabs(place.curvature_1_m));
       w.scrub = middle.scrub[s] / std::tanh(1 / w.scrub_speed);
       through[0] -= slow.scrub[s], through[1] -= middle.scrub[s], through[2] -= fast.scrub[s];
     }

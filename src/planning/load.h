@@ -50,11 +50,15 @@ struct WheelLoad {
 };
 using WheelLoads = std::array<WheelLoad, 2>;
 
-// Motors that take less coast. A cell within which one turns into a generator is integrated in so many parts,
-// for the rate of losses changes there: the error falls with their square, from 2e-3 of a braking motion's
-// energy.
-inline constexpr double coasting_w = 1e-6;
-inline constexpr int parts_of_turn = 16;
+// Parts in which a cell is integrated where a motor turns into a generator, or back, for the rate of losses
+// changes there. The error falls with their square, from 2e-3 of a braking motion's energy, and is the
+// smaller the less power the motor takes or gives at one end.
+inline int parts_of_turn(double from_w, double to_w, double idle_w) {
+  if ((from_w > 0) == (to_w > 0)) return 1;
+  const double from = std::fabs(from_w), to = std::fabs(to_w);
+  return std::max(1,
+                  static_cast<int>(std::ceil(32 * std::sqrt(2 * std::min(from, to) / (idle_w + from + to)))));
+}
 
 // Electrical constants of the drive. P = copper T^2 + back_emf w T + brush |T| for each motor; the battery
 // gives idle + sum of (up P where P > 0, down P where P < 0).
@@ -78,8 +82,7 @@ class DriveLoads {
   const dynamics::DriveModel& model() const { return model_; }
   const Electric& electric() const { return electric_; }
 
-  // Loads at a way of the run where the curvature changes by `curvature_slope` per metre.
-  WheelLoads at(const Run& run, const Knot& knot, double curvature_slope) const;
+  WheelLoads at(const Run& run, const Place& place) const;
 
   // Whether the moment of scrub builds up with the yaw rate.
   bool scrubs() const { return scrub_rate_rad_s_ > 0; }
@@ -87,9 +90,7 @@ class DriveLoads {
   // Whether the loads are the same all along the run.
   bool uniform(const Run& run) const;
 
-  // Motion at a knot of a run.
-  dynamics::Instant instant(const Run& run, const Knot& knot, double curvature_slope, double speed,
-                            double acceleration) const;
+  dynamics::Instant instant(const Run& run, const Place& place, double speed, double acceleration) const;
 
  private:
   explicit DriveLoads(dynamics::DriveModel model) : model_(std::move(model)) {}

@@ -259,7 +259,7 @@ class Builder {
   }
 
   void turn(double angle) {
-    if (angle == 0) return;
+    if (std::fabs(angle) < same_place_m) return;  // of a point one metre away
     close();
     Run run;
     run.turn = angle > 0 ? 1 : -1;
@@ -358,24 +358,20 @@ bool Run::constant_curvature() const {
   });
 }
 
-Knot Run::at(double way) const {
+Place Run::at(double way) const {
   auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,
                                 [](double w, const Knot& k) { return w < k.way; });
   const Knot &b = *above, &a = *(above - 1);
   const double f = std::clamp((way - a.way) / (b.way - a.way), 0.0, 1.0);
   const auto mix = [f](double p, double q) { return p + f * (q - p); };
+  const double change = b.curvature_1_m - a.curvature_1_m;
   // The integral of the curvature bends the heading between its knots.
-  const double bend = 0.5 * f * (f - 1) * (b.curvature_1_m - a.curvature_1_m) * (b.way - a.way);
-  return {way,
-          mix(a.curvature_1_m, b.curvature_1_m),
-          {mix(a.pose.x_m, b.pose.x_m), mix(a.pose.y_m, b.pose.y_m),
-           mix(a.pose.heading_rad, b.pose.heading_rad) + bend}};
-}
-
-double Run::curvature_slope(double way) const {
-  const auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,
-                                      [](double w, const Knot& k) { return w < k.way; });
-  return (above->curvature_1_m - (above - 1)->curvature_1_m) / (above->way - (above - 1)->way);
+  const double bend = 0.5 * f * (f - 1) * change * (b.way - a.way);
+  return {{way,
+           mix(a.curvature_1_m, b.curvature_1_m),
+           {mix(a.pose.x_m, b.pose.x_m), mix(a.pose.y_m, b.pose.y_m),
+            mix(a.pose.heading_rad, b.pose.heading_rad) + bend}},
+          change / (b.way - a.way)};
 }
 
 double Path::distance_m() const {

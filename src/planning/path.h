@@ -73,6 +73,11 @@ struct Knot {
 
 // A segment driven without a stop: from rest to rest except at the ends of the whole path. Its coordinate is
 // the way of the axle's middle [m], or the angle turned [rad, > 0] when the robot turns in place.
+// Of a run.
+struct Place : Knot {
+  double curvature_slope = 0;  // 1/m^2
+};
+
 struct Run {
   int turn = 0;  // +1 or -1: turning in place to the left or right; 0: driving
   // At least 2, ascending; curvature and position are linear in between, the heading turns with the
@@ -84,8 +89,7 @@ struct Run {
   double length() const { return knots.back().way; }
   bool constant_curvature() const;
   bool straight() const { return constant_curvature() && knots[0].curvature_1_m == 0; }
-  Knot at(double way) const;
-  double curvature_slope(double way) const;  // 1/m^2
+  Place at(double way) const;
 };
 
 struct Path {

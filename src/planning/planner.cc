@@ -181,12 +181,7 @@ class Request {
     else if (ok.error().fault != Fault::infeasible || ok.error().field != "value_of_time_w")
       return ok;
     const double spare_j = keeps_until_j_ - least_j, smallest_j = 1e-12 * budget_j;
-    const auto refused = [&] {
-      return fail(Fault::infeasible, "energy_budget_j",
-                  fmt::format("is {} J, the path needs no less than {:.6f} J", budget_j,
-                              std::ceil(least_j / (1 - of_rows) * 1e6) / 1e6));
-    };
-    if (spare_j < 0) return refused();
+    if (spare_j < 0) return {};  // the plan's energy is compared with the budget
     // log(E - E_min) falls nearly linearly in -log(price).
     Search at{-std::log(usual_w), -0.8, -std::log(1e6 * usual_w), -std::log(1e-6 * usual_w)};
     const auto above = [&](double energy_j, double least_energy_j) {
@@ -209,7 +204,7 @@ class Request {
     const double rest = std::clamp(1e-5 * budget_j / std::max(spare_j, smallest_j), 1e-3, 0.5);
     TRY(draw_in(at, -std::log1p(-rest), truly_above));
     keep();
-    if (kept_.answers.empty()) return refused();
+    if (kept_.answers.empty()) return solve(0);
     std::swap(answers_, kept_.answers), price_w_ = kept_.price_w;
     return {};
   }
@@ -414,7 +409,7 @@ class Writer {
     const Run& run = planner.run();
     uniform_ = loads_.uniform(run);
     if (uniform_) {
-      here_ = loads_.instant(run, run.at(0), 0, 1, 1);
+      here_ = loads_.instant(run, run.at(0), 1, 1);
       pace_ = here_.wheel_speed_rad_s;
     }
     if (rows_) reserve(plan_.profile.size() + times.size());
@@ -427,8 +422,12 @@ class Writer {
       const double span = times[k + 1] - times[k];
       const State next = at(k, 1.0);
       int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
-      if (loads_.electric().up != loads_.electric().down && turns(here, flow(planner, next)))
-        parts = std::max(parts, parts_of_turn);
+      if (const Electric& e = loads_.electric(); e.up != e.down) {
+        const dynamics::PowerFlow<double> there = flow(planner, next);
+        for (const std::size_t side : {0u, 1u})
+          parts =
+              std::max(parts, parts_of_turn(here.motor_power_w[side], there.motor_power_w[side], e.idle_w));
+      }
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
           add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
@@ -454,15 +453,8 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
-  // Whether a motor turns into a generator in between, or back.
-  static bool turns(const dynamics::PowerFlow<double>& a, const dynamics::PowerFlow<double>& b) {
-    const auto drives = [](double power_w) { return power_w > coasting_w; };
-    return drives(a.motor_power_w[0]) != drives(b.motor_power_w[0]) ||
-           drives(a.motor_power_w[1]) != drives(b.motor_power_w[1]);
-  }
-
   int parts_of(const Run& run, const State& from, double to_speed) const {
-    return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
+    return loads_.at(run, run.at(from.way))[0].parts(from.speed, to_speed);
   }
 
   // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
@@ -476,14 +468,11 @@ class Writer {
       return loads_.model().flow(here_);
     }
     const Run& run = planner.run();
-    const double slope = run.turn == 0 ? slope_at(run, s.way) : 0;
-    return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
+    return loads_.model().flow(loads_.instant(run, just_after(run, s.way), s.speed, s.acceleration));
   }
 
-  // Just after a place, as in the rows.
-  static double slope_at(const Run& run, double way) {
-    return run.curvature_slope(way + 1e-9 * run.length());
-  }
+  // As in the rows: the curvature's slope jumps at knots.
+  static Place just_after(const Run& run, double way) { return run.at(way + 1e-9 * run.length()); }
 
   void add(const dynamics::PowerFlow<double>& f, double seconds) {
     using signals::Term;
@@ -511,8 +500,8 @@ class Writer {
            power);
     } else {
       push(time_s, driven_m_ + s.way, knot.pose, s.speed, knot.curvature_1_m * s.speed, s.acceleration,
-           knot.curvature_1_m * s.acceleration + slope_at(run, s.way) * s.speed * s.speed, run.payload_kg,
-           power);
+           knot.curvature_1_m * s.acceleration + just_after(run, s.way).curvature_slope * s.speed * s.speed,
+           run.payload_kg, power);
     }
   }
 
@@ -619,6 +608,12 @@ Result<Plan> Request::written() {
   s.duration_s = duration_s();
   s.distance_m = path_.distance_m();
   s.turned_rad = path_.turned_rad();
+  // Answers have ten digits: an energy that one contains is a budget.
+  if (problem_.energy_budget_j && s.energy_j > (1 + 1e-9) * *problem_.energy_budget_j) {
+    return fail(Fault::infeasible, "energy_budget_j",
+                fmt::format("is {} J, the path needs no less than {:.6f} J", *problem_.energy_budget_j,
+                            std::ceil(s.energy_j * 1e6) / 1e6));
+  }
   return writer.finish();
 }
 

@@ -251,8 +251,7 @@ SpeedGrid RunPlanner::grid_over(const std::vector<double>& nodes) const {
   } else {
     grid.loads.reserve(n);
     for (std::size_t k = 0; k < n; ++k) {
-      const double middle = 0.5 * (nodes[k] + nodes[k + 1]);
-      grid.loads.push_back(loads_->at(*run_, run_->at(middle), run_->curvature_slope(middle)));
+      grid.loads.push_back(loads_->at(*run_, run_->at(0.5 * (nodes[k] + nodes[k + 1]))));
     }
     add_end_loads(nodes, grid);
   }
@@ -291,8 +290,7 @@ void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     // The slope of the curvature and the direction of a wheel may jump at a node.
     const auto within = [&](double share) {
-      const double way = nodes[k] + share * grid.step[k];
-      return loads_->at(*run_, run_->at(way), run_->curvature_slope(way));
+      return loads_->at(*run_, run_->at(nodes[k] + share * grid.step[k]));
     };
     grid.end_loads.push_back({within(1e-6), within(1 - 1e-6)});
   }
@@ -363,7 +361,7 @@ Result<void> RunPlanner::check_feasible() const {
   SpeedGrid from_rest = grid;
   from_rest.start = 0;
   return fail(Fault::infeasible, "limits",
-              "no speed satisfies them " + number(where) + " along the way" +
+              "no speed satisfies them " + number(where) + " m along the way" +
                   (speed_envelope(from_rest).feasible ? "; starting from rest would" : ""));
 }
 
@@ -535,7 +533,7 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
                 "has a run between stops of more than 200000 knots, which are 1 cm apart on curves; give it "
                 "in parts");
   }
-  if (planner.uniform_) planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
+  if (planner.uniform_) planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()));
   if (planner.uniform_ && (run.turn != 0 || problem.limits.least_speed_m_s == 0)) {
     planner.find_line();
     // Without active motor limits, the closed form determines feasibility; the grid is built only when it is
@@ -630,7 +628,7 @@ std::optional<RestMotion> RunPlanner::to_peak(double peak, double price_w) {
 }
 
 double RunPlanner::steady_power_w(double speed) const {
-  const dynamics::Instant at = loads_->instant(*run_, run_->at(0), 0, speed, 0);
+  const dynamics::Instant at = loads_->instant(*run_, run_->at(0), speed, 0);
   return loads_->model().flow(at).battery_power_w;
 }
 
@@ -692,7 +690,7 @@ std::vector<double> RunPlanner::least_parts(const SpeedGrid& grid, const std::ve
     if (grid.end_loads.empty() || middle < -near_limits) continue;
     for (auto knot = knot_after(nodes[k]); knot->way < nodes[k + 1] && parts[k] != at_knots; ++knot) {
       for (const double side : {-1e-9, 0.0}) {
-        const WheelLoads here = loads_->at(*run_, *knot, run_->curvature_slope(knot->way + side));
+        const WheelLoads here = loads_->at(*run_, {*knot, run_->at(knot->way + side).curvature_slope});
         if (beyond(here, knot->way) > over_between_rows) parts[k] = at_knots;
       }
     }
@@ -845,13 +843,12 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
   for (std::size_t k = 0; k < energy.size(); ++k) {
     const double v0 = std::sqrt(z[k]), change = std::sqrt(z[k + 1]) - v0;
     const double span = (nodes[k + 1] - nodes[k]) / (v0 + 0.5 * change);
-    const int parts =
-        loads_->scrubs() ? loads_->at(*run_, run_->at(nodes[k]), 0)[0].parts(v0, v0 + change) : 1;
+    const int parts = loads_->scrubs() ? loads_->at(*run_, run_->at(nodes[k]))[0].parts(v0, v0 + change) : 1;
     for (int part = 0; part < parts; ++part) {
       for (const auto& [place, weight] : gauss2) {
         const double at = (part + place) / parts, way = nodes[k] + at * span * (v0 + 0.5 * at * change);
-        const dynamics::Instant instant = loads_->instant(*run_, run_->at(way), run_->curvature_slope(way),
-                                                          v0 + at * change, change / span);
+        const dynamics::Instant instant =
+            loads_->instant(*run_, run_->at(way), v0 + at * change, change / span);
         energy[k] += weight * span / parts * loads_->model().flow(instant).battery_power_w;
       }
     }

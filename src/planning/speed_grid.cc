@@ -127,25 +127,27 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.back() = grid.end;
 
   const auto most_change = [&](std::size_t cell) { return 2 * grid.step[cell] * grid.acceleration_limit; };
-  // The greatest z between `low` and `high` that keeps the limits, by regula falsi (Illinois) from `same`,
-  // the z of the cell's other end, or from `low`.
-  const auto highest = [](auto&& use_at, double low, double high, double same) {
-    const auto excess = [&](double z) { return use_at(z) - (1 - just_below); };
-    double above = excess(high), below = 0;
-    if (!(above > just_below)) return high;
-    for (const double from : {same, low}) {
-      if (from < high && (below = excess(from)) < 0) {
-        low = from;
-        break;
-      }
-    }
-    if (!(below < 0)) return low;
+  // A zero of a function that rises, by regula falsi (Illinois), or a place just below it.
+  const auto zero = [](auto&& f, double low, double below, double high, double above) {
     for (int last = 0, k = 0; k < 100 && high - low > just_below * low; ++k) {
-      const double z = low + (high - low) * below / (below - above), y = excess(z);
+      const double z = low + (high - low) * below / (below - above), y = f(z);
       if (std::fabs(y) < just_below) return z;
       double& other = y > 0 ? below : above;
       if (const int side = y > 0 ? 1 : -1; std::exchange(last, side) == side) other *= 0.5;
       (y > 0 ? high : low) = z, (y > 0 ? above : below) = y;
+    }
+    return low;
+  };
+  // The greatest z between `low` and `high` that keeps the limits; `same` is the z of the cell's other end.
+  const auto highest = [&](auto&& use_at, double low, double high, double same) {
+    const auto excess = [&](double z) { return use_at(z) - (1 - just_below); };
+    double above = excess(high);
+    if (!(above > just_below)) return high;
+    for (const double from : {same, 2 * same - high, low}) {
+      if (!(from < high && from >= low)) continue;
+      const double y = excess(from);
+      if (y < 0) return zero(excess, from, y, high, above);
+      high = from, above = y;
     }
     return low;
   };
@@ -158,16 +160,21 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   // From which speeds a cell can be left within its bound, which may take slowing down. Then those from which
   // the start leads on as fast as possible (Pham & Pham, IEEE Trans. Robot. 34 (2018), sec. III).
   for (std::size_t k = n; k-- > 0;) {
-    const auto most = [&](double near) {
-      const MotorUse top = motor_use(grid, k, near, e.fastest[k + 1]);
+    // The least share of the limits that some far end takes.
+    const auto least = [&](double near) {
+      const double low = std::max(0.0, near - most_change(k)),
+                   high = std::min(e.fastest[k + 1], near + most_change(k));
+      const auto use_at = [&](double far) { return motor_use(grid, k, near, far); };
+      const MotorUse top = use_at(high);
       if (top.slowing > 1 || top.rising <= 1) return top.slowing;
-      const double steady = motor_use(grid, k, near, std::min(near, e.fastest[k + 1])).most();
-      if (steady < 1) return steady;
-      const MotorUse after = motor_use(grid, k, near, fastest_after(k, near));
-      return after.rising > 1 ? after.rising : after.slowing;
+      const MotorUse bottom = use_at(low);
+      if (bottom.rising > 1 || bottom.slowing <= 1) return bottom.rising;
+      const auto lean = [](const MotorUse& use) { return use.rising - use.slowing; };
+      return use_at(zero([&](double far) { return lean(use_at(far)); }, low, lean(bottom), high, lean(top)))
+          .most();
     };
     e.fastest[k] =
-        highest(most, 0, std::min(e.fastest[k], e.fastest[k + 1] + most_change(k)), e.fastest[k + 1]);
+        highest(least, 0, std::min(e.fastest[k], e.fastest[k + 1] + most_change(k)), e.fastest[k + 1]);
   }
   for (std::size_t k = 0; k < n; ++k) e.fastest[k + 1] = fastest_after(k, e.fastest[k]);
   e.slowest = slowest_profile(grid, grid.acceleration_limit);

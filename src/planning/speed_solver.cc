@@ -81,11 +81,6 @@ class Logarithms {
   double product_ = 1, sum_ = 0;
 };
 
-// Shortens a step so that a positive value keeps its share: N&W (19.9).
-void shorten(double value, double change, double& step) {
-  if (change < 0 && -change * step > to_boundary * value) step = to_boundary * value / -change;
-}
-
 }  // namespace
 
 SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_profile(grid_)) {
@@ -333,7 +328,7 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
 
 // Gradient and tridiagonal Hessian of the Lagrangian with the bounds condensed, at z_.
 void SpeedSolver::assemble(double mu) {
-  cost_here_ = kink_gap_ = 0;
+  cost_here_ = kink_gap_ = products_ = 0;
   Logarithms logs;
   const std::size_t n = grid_.cells();
   std::fill(gradient_.begin(), gradient_.end(), 0.0);
@@ -373,6 +368,7 @@ void SpeedSolver::assemble(double mu) {
                  gradient_[k] += push * g0, gradient_[k + 1] += push * g1;
                  stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
                });
+    for (const BoundState& b : bounds_of(k)) products_ += b.multiplier * b.slack;
     diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
     off_[k] += d01;
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
@@ -531,13 +527,6 @@ bool SpeedSolver::regularise(double damping, bool& corrected) {
   return true;
 }
 
-// Sum of multipliers times slacks.
-double SpeedSolver::complementarity() const {
-  double gap = 0;
-  for (const BoundState& b : bound_states_) gap += b.multiplier * b.slack;
-  return gap;
-}
-
 std::vector<double> SpeedSolver::cost_of_ends() const {
   if (!bounds_motors_) return {};
   std::vector<double> cost(grid_.cells(), 0);
@@ -560,15 +549,14 @@ double SpeedSolver::stationarity_residual() const {
   return worst;
 }
 
-// Longest step that keeps a share of every bound's slack, the motors' linearised.
+// Longest step that keeps a share of every bound's slack, the motors' linearised: N&W (19.9).
 double SpeedSolver::step_to_boundary() const {
-  double longest = 1;
+  double used = to_boundary;  // the largest share of a slack by the whole step
   for (std::size_t k = 0; k < grid_.cells(); ++k)
-    for (const BoundState& b : bounds_of(k)) {
-      const double room = b.index < of_motors ? b.slack : linear_share * b.slack;
-      shorten(room, -b.change(step_[k], step_[k + 1]), longest);
-    }
-  return longest;
+    for (const BoundState& b : bounds_of(k))
+      used = std::max(
+          used, b.change(step_[k], step_[k + 1]) / (b.slack * (b.index < of_motors ? 1 : linear_share)));
+  return to_boundary / used;
 }
 
 double SpeedSolver::decrement() const {
@@ -733,7 +721,7 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     solve_step(slope_, step_);
     const double late_s = due ? follow_price(due->duration_s) : 0;
     if (due && idle_ > grid_.electric.idle_w + due->most_w) break;
-    const double left = complementarity(), allowed = tolerance * barrier.scale();
+    const double left = products_, allowed = tolerance * barrier.scale();
     solution.residual = stationarity_residual() / barrier.scale();
     if (barrier.at_finest() && left < 3 * allowed && decrement() < 0.3 * allowed &&
         !(due && std::fabs(late_s) > tolerance * due->duration_s) &&

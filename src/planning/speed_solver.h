@@ -144,7 +144,6 @@ class SpeedSolver {
   bool regularise(double damping, bool& corrected);
   void solve_step(const std::vector<double>& slope, std::vector<double>& step) const;
   double follow_price(double due_s);
-  double complementarity() const;
   std::vector<double> cost_of_ends() const;
   double stationarity_residual() const;
   double step_to_boundary() const;
@@ -176,6 +175,7 @@ class SpeedSolver {
   std::vector<double> gradient_, slope_, stationarity_, by_price_, diagonal_, off_, magnitude_, pivot_,
       lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
+  double products_ = 0;                    // sum of multipliers times slacks
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
   bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
 };

@@ -480,9 +480,8 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
       return motors(here, std::copysign(piece.acceleration, change)).w;
     };
     double power = 0, least = 0;
-    const bool turns = task_.electric.up != task_.electric.down &&
-                       (power_w(local(piece.from)) > coasting_w) != (power_w(local(piece.to)) > coasting_w);
-    const int parts = turns ? parts_of_turn : 1;
+    const bool lossy = task_.electric.up != task_.electric.down;
+    const int parts = lossy ? parts_of_turn(power_w(local(piece.from)), power_w(local(piece.to)), idle_w) : 1;
     for (int part = 0; part < parts; ++part) {
       for (const auto& [at, weight] : gauss3) {
         const Local here = local(piece.from + (part + at) / parts * change);

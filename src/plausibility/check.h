@@ -41,7 +41,9 @@ struct Check {
   // measurement.
   std::optional<double> factor{};
   bool swapped = false;  // the sides of the channel, or both of its channels, are exchanged
-  // Of such a sign or unit; where the channel is not contradicted, that there is any error in its place.
+  // Of a sign or unit: probability that the readings have any error in its place and, where the channel is
+  // contradicted, that they have this one.
+  double error = std::numeric_limits<double>::quiet_NaN();
   double probability = std::numeric_limits<double>::quiet_NaN();
 };
 

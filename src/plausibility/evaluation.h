@@ -88,7 +88,7 @@ void check_delays(const CheckContext& c, Checks& checks);
 void check_steps(const CheckContext& c, Checks& checks);
 // Readings that jump for a single row.
 void check_spikes(const CheckContext& c, Checks& checks);
-// Held, coarse, clipped, missing.
+// Held, missing.
 void check_readings(const CheckContext& c, Checks& checks);
 
 // Fields with a large share of samples that are left out for implausible readings.

@@ -328,7 +328,6 @@ std::array<MotorConstants, 2> motor_constants(const CheckContext& c) {
     const BlockFit electric = fit_armature(c, of_side(Relation::armature_right, side));
     m.resistance_ohm = estimate(electric, 0);
     m.constant_v_s_rad = estimate(electric, 1);
-    m.drop_v = estimate(electric, 2);
     const auto blocks = c.blocks(of_side(Relation::torque_right, side));
     double rows = 0, speed = 0;
     for (const auto& block : blocks) rows += block.rows, speed += block.sums(1, 2);

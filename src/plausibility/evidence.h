@@ -74,7 +74,6 @@ struct ChannelEvidence : EvidenceTraits {
 struct MotorConstants {
   Estimate resistance_ohm;        // R
   Estimate constant_v_s_rad;      // K, gear included
-  Estimate drop_v;                // c
   Estimate steady_current_a;      // at mean_speed_rad_s, positive in the direction of the wheel
   Estimate current_per_rad_s2_a;  // for equal acceleration of both wheels
   double mean_speed_rad_s = 0;    // while it turns

@@ -360,7 +360,7 @@ void check_faults(const CheckContext& c, Checks& checks) {
         fmt::format("{} {} {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
                     contradicted ? "looks" : "may be", fault.cause, e.says, with_interval(e.ratio), e.against,
                     contract_of(fault.channel), also(explanation.alternatives[k], measured));
-    check.probability = explanation.any[k];
+    check.error = explanation.any[k];
     if (!contradicted) continue;
     // A robot file that is wrong by the factor would look the same.
     const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);

@@ -4,7 +4,6 @@
 #include <limits>
 
 #include "plausibility/evaluation.h"
-#include "statistics/robust.h"
 #include "statistics/updates.h"
 
 namespace joulecast::plausibility {
@@ -13,12 +12,7 @@ namespace {
 constexpr std::size_t fewest_spikes = 3;
 constexpr std::size_t fewest_leaps = 2;  // there and back
 constexpr double least_held = 1.5;       // periods of rows; below, a reading is new in each row
-constexpr double coarse = 1;  // step over the standard deviation; rounding adds a third of it as noise
-constexpr std::size_t most_levels = 64;  // distinct values of a coarse channel
-constexpr double clipped_share = 0.01;
-constexpr std::size_t fewest_clips = 3;
-constexpr double longest_plateau = 3;  // usual repetitions of a value
-constexpr double slowest = 100;        // rows between values of a working sensor
+constexpr double slowest = 100;          // rows between values of a working sensor
 constexpr double lost_share = 0.5;
 constexpr double biased_share = 0.1;  // of the samples; beyond, the remaining samples are biased
 
@@ -27,53 +21,25 @@ bool is_used(std::size_t k) {
   return k <= reading::battery_current || k == reading::yaw_rate;
 }
 
-// One reading's rows of all missions.
-struct Rows {
-  double count = 0, lost = 0;  // lost: in gaps longer than those of a slow sensor
-  std::vector<double> levels;  // distinct values in order; empty if there are many
-  // Rows with the highest or the lowest value, the more frequent of the two, and the runs that they form.
-  double extreme = 0, extreme_rows = 0;
-  std::size_t extreme_runs = 0;
-};
-
-Rows rows_of(const CheckContext& c, std::size_t reading) {
-  const auto value_of = [&](const signals::Sample& s) { return *signals::numbers_of(s)[reading]; };
-  const double low = c.tally(reading).low(), high = c.tally(reading).high();
-  Rows rows;
-  std::array<double, 2> at{};  // rows with the lowest and the highest value
-  std::array<std::size_t, 2> runs{};
+// Share of a reading's rows in gaps longer than those of a slow sensor.
+double lost_rows(const CheckContext& c, std::size_t reading) {
+  double count = 0, lost = 0;
   for (const telemetry::Recording& mission : c.missions) {
-    double missing = 0, last = signals::unmeasured;
+    double missing = 0;
     const auto end_gap = [&] {
-      if (missing > slowest) rows.lost += missing;
+      if (missing > slowest) lost += missing;
       missing = 0;
     };
     for (const signals::Sample& s : mission.samples) {
-      const double value = value_of(s);
-      ++rows.count;
-      if (!std::isfinite(value)) {
+      if (std::isfinite(*signals::numbers_of(s)[reading]))
+        end_gap();
+      else
         ++missing;
-        continue;
-      }
-      end_gap();
-      for (const std::size_t k : {0u, 1u}) {
-        if (value != (k == 0 ? low : high)) continue;
-        ++at[k];
-        runs[k] += value == last ? 0 : 1;
-      }
-      last = value;
-      if (rows.levels.size() > most_levels) continue;
-      const auto place = std::ranges::lower_bound(rows.levels, value);
-      if (place == rows.levels.end() || *place != value) rows.levels.insert(place, value);
     }
     end_gap();
+    count += static_cast<double>(mission.samples.size());
   }
-  if (rows.levels.size() > most_levels) rows.levels.clear();
-  const std::size_t k = at[1] >= at[0] ? 1 : 0;
-  rows.extreme = k == 0 ? low : high;
-  rows.extreme_rows = at[k];
-  rows.extreme_runs = runs[k];
-  return rows;
+  return lost / count;
 }
 
 void add_to(std::string& list, std::string_view text) {
@@ -94,28 +60,6 @@ void check_held(const CheckContext& c, Checks& checks) {
     add_check(checks, "held_samples", channels, {longest}, false,
               "Rows come every {:.3g} s and repeat readings; new readings come less often: {}.", c.period_s(),
               says);
-}
-
-void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks& checks) {
-  const ValueTally& t = c.tally(k);
-  if (rows.levels.size() > 1) {
-    std::vector<double> steps;
-    for (std::size_t n = 1; n < rows.levels.size(); ++n) steps.push_back(rows.levels[n] - rows.levels[n - 1]);
-    const double step = statistics::median(std::move(steps));
-    if (step >= coarse * t.deviation())
-      add_check(checks, "coarse_channel", reading_names[k], {step}, false,
-                "{} has a resolution of {:.3g}, and a standard deviation of only {:.2g} of that.",
-                reading_names[k], step, t.deviation() / step);
-  }
-  if (k < reading::motor_current || k == reading::battery_voltage || !rows.levels.empty()) return;
-  const double share = rows.extreme_rows / static_cast<double>(t.known());
-  const double held_rows = std::max(1.0, c.held_s[k] / c.period_s());
-  if (rows.extreme != 0 && share >= clipped_share && rows.extreme_runs >= fewest_clips &&
-      rows.extreme_rows >= longest_plateau * held_rows * static_cast<double>(rows.extreme_runs))
-    add_check(checks, "clipped_channel", reading_names[k], {rows.extreme}, false,
-              "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, or "
-              "limited by the driver.",
-              reading_names[k], rows.extreme, 100 * share);
 }
 
 }  // namespace
@@ -178,21 +122,17 @@ void check_spikes(const CheckContext& c, Checks& checks) {
 void check_readings(const CheckContext& c, Checks& checks) {
   std::string missing;
   double most = 0;
-  Checks levels;
   for (std::size_t k = 0; k < reading_count; ++k) {
     if (c.tally(k).known() == 0 && k > reading::wheel_velocity + 1) continue;
-    const Rows rows = rows_of(c, k);
-    if (rows.lost > lost_share * rows.count) {
-      add_to(missing, reading_names[k]);
-      most = std::max(most, rows.lost / rows.count);
-    }
-    if (is_used(k) && c.heard({k})) check_levels(c, k, rows, levels);
+    const double share = lost_rows(c, k);
+    if (share <= lost_share) continue;
+    add_to(missing, reading_names[k]);
+    most = std::max(most, share);
   }
   if (!missing.empty())
     add_check(checks, "mostly_missing", missing, {most}, false,
               "{} missing in up to {:.0f} % of the rows, for long intervals.", missing, 100 * most);
   check_held(c, checks);
-  checks.insert(checks.end(), levels.begin(), levels.end());
 }
 
 std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings) {

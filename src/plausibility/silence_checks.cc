@@ -93,9 +93,10 @@ void check_constant(const CheckContext& c, const std::string& witnesses, Checks&
   if (!dead.empty()) {
     const std::string all = fmt::format("{}", fmt::join(dead, ", "));
     add_check(checks, "dead_channel", all, {0}, true,
-              "{} {} exactly 0 all the time while the robot moves{}: the sensor is dead, or the field is "
-              "never set; joulecast expects NaN for what is not measured.",
-              all, dead.size() == 1 ? "is" : "are", by);
+              "{} {} exactly 0 all the time while the robot moves{}: {} off, or the field is never set; "
+              "joulecast expects NaN for what is not measured.",
+              all, dead.size() == 1 ? "is" : "are", by,
+              all.starts_with("motor_voltage, motor_current") ? "the motors are" : "the sensor is");
   }
   for (const Channel& channel : measured) {
     const bool wheels = channel.first == reading::wheel_velocity;

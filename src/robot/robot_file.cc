@@ -522,7 +522,9 @@ Result<void> validate(const RobotModel& model) {
 }
 
 Result<Battery> parse_battery(std::string_view json_text) {
-  return parse_text(json_text).and_then(parse_battery_document);
+  return parse_text(json_text).and_then([](const Json& document) {
+    return parse_battery_document(document.is_object() ? document.value("battery", document) : document);
+  });
 }
 
 Result<Battery> load_battery(const std::filesystem::path& path) {

@@ -31,7 +31,7 @@ Result<RobotModel> load_robot(const std::filesystem::path& path);
 // Checks a model built in code against the same constraints as a file's.
 Result<void> validate(const RobotModel& model);
 
-// Only the battery object of a robot file, checked by the same rows of the table.
+// The battery of a robot file, or its battery object alone, checked by the same rows of the table.
 Result<Battery> parse_battery(std::string_view json_text);
 Result<Battery> load_battery(const std::filesystem::path& path);
 

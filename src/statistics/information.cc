@@ -1,6 +1,5 @@
 #include "statistics/information.h"
 
-#include <cmath>
 #include <vector>
 
 namespace joulecast::statistics {

@@ -13,6 +13,7 @@
 
 #include "base/median.h"
 #include "base/try.h"
+#include "base/utc_time.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/import_table.h"
@@ -238,7 +239,8 @@ class Importer {
       notes_.push_back(
           R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
           " holds them between the rows");
-    for (const auto& notes : {table_.notes(), notes_})
+    first.settings_detected = table_.settings().size();
+    for (const auto& notes : {table_.settings(), table_.notes(), notes_})
       first.notes.insert(first.notes.end(), notes.begin(), notes.end());
     for (Joined& joined : joined_) {
       if (!joined.lags_us.empty())
@@ -406,7 +408,7 @@ class Importer {
                       : 0;
     const std::int64_t utime_us = row.since_zero_us + *shift_us_;
     if (utime_us < 0 || utime_us > latest_import_utime_us)
-      return table_.refuse(mapping_.layout.time_name(), std::to_string(row.since_zero_us) + " us",
+      return table_.refuse(mapping_.layout.time_name(), utc_text(utime_us),
                            "is not between the years 1970 and 2100");
     // Tables of one recording count from one zero.
     if (first)
@@ -630,6 +632,8 @@ class Importer {
       all.rows_out_of_time += one.report.rows_out_of_time;
       all.rows_without_motion += one.report.rows_without_motion;
     }
+    if (all.rows == 0)
+      return fail(Fault::corrupt, options_.source_name, "has no row of numbers below its header");
     const std::size_t lost = all.rows_out_of_time + all.rows_without_motion;
     if (!result_[0].recording.samples.empty() && 2 * lost <= all.rows) return {};
     std::string without;

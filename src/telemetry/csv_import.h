@@ -55,8 +55,9 @@ struct ImportReport {
   std::size_t cells_filled = 0;         // empty cells of used columns that repeat the value before
   std::vector<Glitch> glitches;         // every value out of its column's limits
   std::vector<JoinReport> joins;        // of the whole main table
-  // Of the whole main table: detected settings, omitted rows, beginnings of missions.
+  // Of the whole main table: detected settings, which come first, omitted rows, beginnings of missions.
   std::vector<std::string> notes;
+  std::size_t settings_detected = 0;
 };
 
 struct Import {

@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 
 #include <array>
+#include <boost/core/noncopyable.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -50,7 +51,7 @@ class AcceptedSenders {
 
 // Receives the robots' messages of one multicast group. Bound to the group's address, so that unicast and
 // other groups of the port do not come in.
-class DatagramSocket {
+class DatagramSocket : boost::noncopyable {
  public:
   // The views end with the call.
   using Handler = std::function<void(const Sender&, const ChannelMessage&, std::int64_t recv_utime_us)>;
@@ -60,8 +61,6 @@ class DatagramSocket {
   static Result<std::unique_ptr<DatagramSocket>> open(const UdpmUrl& url,
                                                       const std::string& interface_address,
                                                       AcceptedSenders accepted, DatagramCounters& counters);
-  DatagramSocket(const DatagramSocket&) = delete;
-  DatagramSocket& operator=(const DatagramSocket&) = delete;
   ~DatagramSocket();
 
   int descriptor() const noexcept { return descriptor_; }

@@ -1,6 +1,5 @@
 #include "telemetry/import_mapping.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <utility>
 

@@ -304,16 +304,21 @@ tl::unexpected<Error> ImportTable::refuse(const std::string& column, std::string
               fmt::format("column '{}': '{}' {}", column, text, what));
 }
 
-std::vector<std::string> ImportTable::notes() const {
-  std::vector<std::string> notes = notes_;
-  if (!encoding().empty()) notes.push_back("the text is in " + encoding());
-  if (format().skip_lines > layout_.format.skip_lines)
-    notes.push_back(fmt::format("{} lines before the header are left out", format().skip_lines));
+std::vector<std::string> ImportTable::settings() const {
+  std::vector<std::string> settings;
+  if (!encoding().empty()) settings.push_back("the text is in " + encoding());
   if (decimal_comma_ || grouped_ || (layout_.format.separator == '\0' && format().separator != ','))
-    notes.push_back(fmt::format(
+    settings.push_back(fmt::format(
         "the separator is {}, the decimal sign '{}'{}",
         format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
         decimal_comma_ ? ',' : '.', grouped_ ? ", the other between groups of three digits" : ""));
+  return settings;
+}
+
+std::vector<std::string> ImportTable::notes() const {
+  std::vector<std::string> notes = notes_;
+  if (format().skip_lines > layout_.format.skip_lines)
+    notes.push_back(fmt::format("{} lines before the header are left out", format().skip_lines));
   if (timeless_ > 0)
     notes.push_back(
         fmt::format("rows without a time left out: {}, the first: {}", timeless_, first_timeless_->field));

@@ -54,7 +54,8 @@ class ImportTable : public CsvTable {
   // An error at the row's line.
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
                                              const std::string& what) const;
-  // Detected settings and omitted rows, as sentences.
+  // Detected settings, and omitted rows, as sentences.
+  [[nodiscard]] std::vector<std::string> settings() const;
   [[nodiscard]] std::vector<std::string> notes() const;
 
  private:

@@ -142,14 +142,19 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
     const char* name;
     double* reading;
     double limit, motion;
+    bool off = false;
+  };
+  // A motor that is off has neither voltage nor current, however its wheel turns: that is no error.
+  const auto off = [&](std::size_t side) {
+    return sample.motor_voltage_v[side] == 0 && sample.motor_current_a[side] == 0;
   };
   const std::array<Follower, 6> followers{
       {{"battery_current", &sample.battery_current_a, current_a_,
         0.5 * speed_share_s_ * (std::fabs(right) + std::fabs(left))},
-       {"motor_voltage.right", sample.motor_voltage_v.data(), greatest_v, speed_share_s_ * right},
-       {"motor_voltage.left", &sample.motor_voltage_v[1], greatest_v, speed_share_s_ * left},
-       {"motor_current.right", sample.motor_current_a.data(), current_a_, speed_share_s_ * right},
-       {"motor_current.left", &sample.motor_current_a[1], current_a_, speed_share_s_ * left},
+       {"motor_voltage.right", sample.motor_voltage_v.data(), greatest_v, speed_share_s_ * right, off(0)},
+       {"motor_voltage.left", &sample.motor_voltage_v[1], greatest_v, speed_share_s_ * left, off(1)},
+       {"motor_current.right", sample.motor_current_a.data(), current_a_, speed_share_s_ * right, off(0)},
+       {"motor_current.left", &sample.motor_current_a[1], current_a_, speed_share_s_ * left, off(1)},
        {"yaw_rate", &sample.yaw_rate_rad_s, yaw_rate_rad_s_, turn_share_s_ * (right - left)}}};
   for (std::size_t k = 0; k < followers.size(); ++k) {
     const Follower& f = followers[k];
@@ -165,7 +170,7 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
           "{} is frozen at {:.4g} while the robot moves; before, it repeated a value for {} rows at most",
           f.name, *f.reading, channel.run.usual_rows);
     if (why.empty()) continue;
-    if (!first) first = {f.name, std::move(why)};
+    if (!first && !f.off) first = {f.name, std::move(why)};
     *f.reading = signals::unmeasured;
   }
   return first;

@@ -75,15 +75,18 @@ LcmLink::LcmLink(LcmLink&&) noexcept = default;
 LcmLink& LcmLink::operator=(LcmLink&&) noexcept = default;
 LcmLink::~LcmLink() = default;
 
+Result<void> check_lcm_url(const std::string& provider_url) {
+  const std::string scheme = provider_url.substr(0, provider_url.find("://"));
+  if (scheme == "udpm") return parse_udpm_url(provider_url).map([](const UdpmUrl&) {});
+  if (scheme == "memq" || scheme == "file" || scheme == "tcpq") return {};
+  return invalid("lcm.url", "'" + provider_url + "' must begin with udpm://, tcpq://, file:// or memq://");
+}
+
 Result<LcmLink> LcmLink::open(const std::string& provider_url) {
+  TRY(check_lcm_url(provider_url));
   auto state = std::make_unique<State>();
   state->url = provider_url;
-  const std::string scheme = provider_url.substr(0, provider_url.find("://"));
-  if (scheme == "udpm") {
-    TRY_ASSIGN(state->udpm, parse_udpm_url(provider_url));
-  } else if (scheme != "memq" && scheme != "file" && scheme != "tcpq") {
-    return invalid("lcm.url", "'" + provider_url + "' must begin with udpm://, tcpq://, file:// or memq://");
-  }
+  if (provider_url.starts_with("udpm")) state->udpm = *parse_udpm_url(provider_url);
   state->wake_fd = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
   if (state->wake_fd < 0) return fail(Fault::unavailable, "lcm", std::strerror(errno));
   state->lcm.reset(lcm_create(provider_url.c_str()));

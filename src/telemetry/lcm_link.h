@@ -19,6 +19,9 @@ namespace joulecast::telemetry {
 // net.core.rmem_max allows that size.
 inline constexpr std::string_view default_lcm_url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
 
+// A fault of an LCM URL that is visible without opening it.
+Result<void> check_lcm_url(const std::string& provider_url);
+
 struct Received {
   std::string_view channel;
   std::span<const std::uint8_t> data;

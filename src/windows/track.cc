@@ -14,18 +14,6 @@ namespace {
 
 using signals::Sample;
 
-// Median distance between neighbouring values among readings that differ: the step of a coarse converter,
-// next to nothing for a fine one.
-double step_of(std::vector<double> readings) {
-  std::erase_if(readings, [](double v) { return !std::isfinite(v); });
-  std::ranges::sort(readings);
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < readings.size(); ++k) {
-    if (readings[k] > readings[k - 1]) steps.push_back(readings[k] - readings[k - 1]);
-  }
-  return steps.empty() ? 0 : statistics::median(std::move(steps));
-}
-
 double mean_of_known(const std::vector<double>& v) {
   double sum = 0, known = 0;
   for (const double value : v) {
@@ -139,7 +127,7 @@ class Builder {
       c.power_abs[s][k] = std::fabs(power);
       c.braking[s][k] = std::max(0.0, -power);
       const bool known = std::isfinite(amps[k]);
-      c.current_sign[s][k] = known ? std::tanh((amps[k] - settings_.motor_current_bias_a) / soft_a) : 0.0;
+      c.current_sign[s][k] = known ? std::tanh(amps[k] / soft_a) : 0.0;
       // Where the motor's current is not measured, the nominal friction's heats the winding.
       const double heating_a = known                              ? amps[k]
                                : std::fabs(speed) > resting_rad_s ? friction_current_a(s)
@@ -158,7 +146,6 @@ class Builder {
     const std::size_t n = mission_.samples.size();
     c.battery_voltage = electrical([](const Sample& s) { return s.battery_voltage_v; });
     c.battery_current = electrical([](const Sample& s) { return s.battery_current_a; });
-    c.battery_voltage_step_v = step_of(c.battery_voltage);
     c.mean_battery_voltage_v = mean_of_known(c.battery_voltage);
     c.battery_power.resize(n);
     c.charge.resize(n);

@@ -21,7 +21,7 @@ struct Track {
   std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading,
       payload, charge;
   std::vector<std::vector<double>> covariates;
-  double battery_voltage_step_v = 0, mean_battery_voltage_v = missing;
+  double mean_battery_voltage_v = missing;
   double inductance_h = 0;  // of the robot file
   // Copper heat and mean |wheel speed|, low-passed on every time constant.
   std::array<std::array<std::vector<double>, 2>, heat_time_constants_s.size()> heat;

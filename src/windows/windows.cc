@@ -100,12 +100,10 @@ Window window_at(const Track& c, const Place& at) {
   }
   for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = kernel.mean(c.motion[q]);
   w.battery_voltage_v = kernel.mean(c.battery_voltage);
-  w.battery_voltage_step_v = c.battery_voltage_step_v;
   w.mission_voltage_v = c.mean_battery_voltage_v;
   w.battery_current_a = kernel.mean(c.battery_current);
   w.battery_power_w = kernel.mean(c.battery_power);
   w.battery_power_slope_w_s = kernel.slope(c.battery_power);
-  w.battery_current_slope_a_s = kernel.slope(c.battery_current);
   w.charge_as = kernel.mean(c.charge);
   w.yaw_rate_rad_s = kernel.mean(c.yaw_rate);
   w.climb_rad = kernel.mean(c.climb);
@@ -118,7 +116,7 @@ Window window_at(const Track& c, const Place& at) {
 
 void forget_battery(Window& w) {
   w.battery_voltage_v = w.battery_current_a = w.battery_power_w = missing;
-  w.battery_power_slope_w_s = w.battery_current_slope_a_s = 0;
+  w.battery_power_slope_w_s = 0;
 }
 
 void forget_motors(Window& w) {
@@ -131,7 +129,7 @@ void read_battery(const Track& c, std::size_t row, Window& w) {
   w.battery_voltage_v = c.battery_voltage[row];
   w.battery_current_a = c.battery_current[row];
   w.battery_power_w = c.battery_power[row];
-  w.battery_power_slope_w_s = w.battery_current_slope_a_s = 0;
+  w.battery_power_slope_w_s = 0;
 }
 
 void read_motors(const Track& c, std::size_t row, Window& w) {
@@ -148,7 +146,7 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
 // Readings of the battery at these rows, ascending, of [from_s, from_s + length_s), and the motion about
 // them; empty if the motion is not available.
 std::optional<Window> power_row(const Track& c, std::span<const std::size_t> rows, double from_s,
-                                double length_s, double half_s, bool slopes) {
+                                double length_s, double half_s) {
   const auto count = static_cast<double>(rows.size());
   const auto mean = [&](const std::vector<double>& v) {
     double sum = 0;
@@ -196,11 +194,6 @@ std::optional<Window> power_row(const Track& c, std::span<const std::size_t> row
   w.battery_voltage_v = mean(c.battery_voltage);
   w.battery_current_a = mean(c.battery_current);
   w.battery_power_w = mean(c.battery_power);
-  if (slopes) {
-    w.battery_power_slope_w_s = line_at(c.time_s, c.battery_power, w.t_s, half_s).slope;
-    w.battery_current_slope_a_s = line_at(c.time_s, c.battery_current, w.t_s, half_s).slope;
-  }
-  w.battery_voltage_step_v = c.battery_voltage_step_v;
   w.mission_voltage_v = c.mean_battery_voltage_v;
   w.charge_as = mean(c.charge);
   w.payload_kg = mean(c.payload);
@@ -292,8 +285,6 @@ class MissionWindows {
     const auto updates = statistics::find_updates(t, track_.battery_current);
     const double length = power_row_s(updates.period_s),
                  half = std::max(settings_.length_s, line_rows * period_s_);
-    // A delay that checks did not measure is shorter than a row can show; a repeated reading has no slope.
-    const bool slopes = settings_.electrical_delay_s != 0 && !updates.held;
     double last = -2, next_span = 0;
     std::vector<std::size_t> rows;
     for (std::size_t k = 0; k < updates.at.size();) {
@@ -304,7 +295,7 @@ class MissionWindows {
       }
       const bool kept = position++ / kept_together % keep_every == 0;
       if (!kept || rows.empty()) continue;
-      auto w = power_row(track_, rows, row * length, length, half, slopes);
+      auto w = power_row(track_, rows, row * length, length, half);
       if (!w) continue;
       if (row >= next_span) {
         add_span(track_, settings_, robot_, *w);

@@ -48,9 +48,8 @@ struct Window {
   std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
   std::array<double, motion_time_constants_s.size()> recent_rad_s{};  // mean |wheel speed|, low-passed
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
-  double battery_voltage_step_v = 0;   // between readings that differ, of the whole mission
   double mission_voltage_v = missing;  // mean battery voltage of the whole mission
-  double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
+  double battery_power_slope_w_s = 0;
   double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
   double charge_as = 0;           // drawn since the mission began
   double yaw_rate_rad_s = missing;
@@ -79,7 +78,6 @@ struct WindowSettings {
   double longest_gap_s = 0.25;      // between samples inside a window
   double span_s = 1.0;              // over which progress by the map is compared
   double electrical_delay_s = 0;    // by which electrical channels lag; taken out before windowing
-  double motor_current_bias_a = 0;  // of the reading, used for the sign of a current
   std::size_t most_windows = 8000;  // beyond it, segments of windows are left out evenly
 };
 

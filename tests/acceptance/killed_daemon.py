@@ -83,6 +83,13 @@ def main():
     finally:
         fleet.terminate()
         fleet.wait()
+    before = {robot: programs.get(f"/v1/robots/{robot}/state") for robot in robots}
+    check(programs.stop() == 0, "the daemon did not stop in order")
+    programs.start()
+    for robot, state in before.items():
+        silent = programs.get(f"/v1/robots/{robot}/state")
+        for name in ("state_of_charge", "state_of_charge_sd"):
+            check(abs(silent[name] - state[name]) < 1e-3, f"{robot}: {name} {state[name]}, after a restart {silent[name]}")
     began = time.monotonic()
     check(programs.stop() == 0, "the daemon did not stop in order")
     print(f"stopped within {time.monotonic() - began:.2f} s")

@@ -1,3 +1,5 @@
+#include "answers/autonomy.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,9 +8,8 @@
 #include <set>
 #include <string>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/battery_dialects.h"
-#include "answers/json/profile_json.h"
+#include "answers/battery_dialects.h"
+#include "answers/profile.h"
 #include "ingest/forecasts.h"
 #include "server/api/robot_json.h"
 #include "tests/ingest/harness.h"
@@ -322,6 +323,7 @@ TEST_F(AutonomyAnswer, FaultsNameTheField) {
       "task drives or stands");
   EXPECT_EQ(fault({{"tasks", {{{"task_id", "t"}, {"payload_kg", 5}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"tasks", {{{"path", json::array()}}}}}, &live_).field, "/tasks/0/path");
+  EXPECT_EQ(fault({{"tasks", {{{"dropoff", {{"x_m", 1}, {"y_m", 2}}}}}}}, &live_).field, "/tasks/0/pickup");
   EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");
   EXPECT_EQ(fault({{"confidence", 1}}, &live_).field, "/confidence");
   EXPECT_EQ(fault({{"to_charger_m", 5}, {"tasks", {{{"distances_m", {5}}}}}}, &live_).field,

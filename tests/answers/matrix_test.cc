@@ -1,3 +1,5 @@
+#include "answers/matrix.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,8 +11,7 @@
 #include <numbers>
 #include <random>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/matrix_json.h"
+#include "answers/autonomy.h"
 #include "planning/cost_matrix.h"
 #include "tests/support/sample_robots.h"
 

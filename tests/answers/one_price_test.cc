@@ -5,11 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/matrix_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
 #include "answers/matrix.h"
+#include "answers/profile.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::answers {

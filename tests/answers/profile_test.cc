@@ -1,3 +1,5 @@
+#include "answers/profile.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -6,9 +8,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::answers {
@@ -334,6 +335,8 @@ TEST(Profile, SpendsAnEnergyBudget) {
   // The same duration as a deadline takes the same energy.
   const json again = answer(profile_answer, {{"path", path}, {"deadline_s", a["duration_s"]}});
   EXPECT_NEAR(again["energy_j"], a["energy_j"].get<double>(), 1e-4 * least_j);
+  EXPECT_EQ(fault(profile_answer, {{"distances_m", {1e-300}}}).field, "/distances_m");
+  EXPECT_EQ(fault(profile_answer, {{"path", {{{"kind", "turn"}, {"angle_rad", 1e-300}}}}}).field, "path");
   EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 9}, {"deadline_s", 9}}).field,
             "/energy_budget_j");
   EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 0.5 * least_j}}).fault,

@@ -1,4 +1,3 @@
-#include "base/output_file.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "answers/json/profile_json.h"
+#include "answers/profile.h"
 #include "planning/planner.h"
 #include "tests/benchmarks/noisy_drive.h"
 

@@ -144,7 +144,7 @@ TEST_F(CheckCommand, NamesDoubledCountsOfTables) {
   EXPECT_EQ(check({table, "--mapping", how}), Exit::ok);
   EXPECT_THAT(printed_, HasSubstr("units and signs were not checked: that needs --robot FILE"));
   EXPECT_EQ(check({table, "--mapping", how, "--robot", amr}), Exit::fault);
-  EXPECT_THAT(printed_, HasSubstr("wheel_velocity looks counted twice"));
+  EXPECT_THAT(printed_, HasSubstr("fault amr: wheel_velocity_scale: wheel_velocity looks counted twice"));
   // Divided once too often.
   for (json& side : mapping["fields"]["wheel_velocity"]) side["divide_by"] = 2673.8;
   EXPECT_EQ(check({table, "--mapping", file("n.json", mapping.dump()), "--robot", amr}), Exit::warned);
@@ -159,6 +159,17 @@ TEST_F(CheckCommand, NamesPlaceOfTableErrors) {
   const json finding = json::parse(printed_)["findings"].back();
   EXPECT_EQ(finding["about"], table);
   EXPECT_EQ(finding["field"], "line 1");
+}
+
+TEST_F(CheckCommand, DetectedSettingsAreNoWarnings) {
+  std::string csv = "t;r;l;v;i\n";
+  for (int k = 0; k < 200; ++k)
+    csv += fmt::format("{},{:02};{};{},5;2{};{}\n", k / 20, k % 20 * 5, k, k, k % 7, k % 5);
+  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}],
+      "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"}}})");
+  EXPECT_EQ(check({file("run.csv", csv), "--mapping", how}), Exit::ok);
+  EXPECT_THAT(printed_, HasSubstr("run.csv: table; the separator is ';', the decimal sign ','\n"));
 }
 
 TEST_F(CheckCommand, ReportsRowsOutOfOrder) {
@@ -271,6 +282,25 @@ TEST_F(CheckCommand, ImportNumbersOnOverMissions) {
   EXPECT_EQ(next, 80);
   check({log});
   EXPECT_THAT(printed_, ::testing::Not(HasSubstr("restart")));
+}
+
+TEST_F(CheckCommand, ReplayWithoutMissionsFails) {
+  auto robot = made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });
+  telemetry::Recording& mission = robot.recordings.missions[0];
+  for (signals::Sample& sample : mission.samples) sample.battery_voltage_v *= 1000;
+  const std::string path = (folder_ / "millivolts.lcmlog").string();
+  auto log = telemetry::EventLogWriter::create(path);
+  ASSERT_TRUE(log);
+  ASSERT_TRUE(telemetry::write_recording(*log, mission));
+  ASSERT_TRUE(log->close());
+  CLI::App program("joulecast");
+  Exit exit = Exit::ok;
+  add_replay(program, exit);
+  std::vector<std::string> words{
+      "replay", path, "--into", (folder_ / "history.db").string(), "--robot", file("amr.json", amr_.dump())};
+  std::reverse(words.begin(), words.end());
+  program.parse(words);
+  EXPECT_EQ(exit, Exit::fault);
 }
 
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {

@@ -1,11 +1,11 @@
-#include "client/commands/gap_output.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "client/commands/outcome.h"
+#include "client/commands/print.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/offer.h"
 #include "tests/gap/verdict/made_diagnosis.h"

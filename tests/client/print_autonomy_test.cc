@@ -1,9 +1,9 @@
-#include "client/commands/print_autonomy.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+
+#include "client/commands/print.h"
 
 namespace joulecast::client {
 namespace {

@@ -258,11 +258,11 @@ void expect_planned(const robot::RobotModel& robot) {
   runs[2].knots = {{0, 0.5, {0, 0, 0.4}}, {2, 0.5, {1.6, 1.4, 1.4}}};
   for (planning::Run& run : runs) {
     run.payload_kg = 6;
-    const planning::Knot& knot = run.knots.front();
-    const planning::WheelLoads wheels = loads->at(run, knot, 0);
+    const planning::Place place{run.knots.front()};
+    const planning::WheelLoads wheels = loads->at(run, place);
     for (const double speed : {0.3, 0.6, 0.9}) {
       for (const double acceleration : {-0.3, 0.0, 0.3}) {
-        const Instant at = loads->instant(run, knot, 0, speed, acceleration);
+        const Instant at = loads->instant(run, place, speed, acceleration);
         const auto flow = loads->model().flow(at);
         EXPECT_NEAR(planned_power_w(loads->electric(), wheels, speed, acceleration), flow.battery_power_w,
                     1e-3 * std::fabs(flow.battery_power_w))

@@ -85,6 +85,9 @@ TEST_F(BackTestTest, BetterModelImproves) {
 
 TEST_F(BackTestTest, OtherModelsDoNotImprove) {
   EXPECT_FALSE(back_test(runs(), truth_, back_tested_nomad())->improves());
+  robot::RobotModel absurd = truth_;
+  absurd.motor.torque_constant_nm_a = 1e-200;
+  EXPECT_EQ(back_test(runs(), truth_, absurd).error().fault, Fault::invalid);
   const auto same = back_test(runs(), back_tested_nomad(), back_tested_nomad());
   EXPECT_FALSE(same->improves());
   EXPECT_EQ(same->improvement(), 0);

@@ -82,10 +82,10 @@ History work(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed, con
   while (machine.next(emission)) {
     if (const auto* sample = std::get_if<signals::Sample>(&emission.message)) {
       equations.add(*sample);
-    } else if (std::get<signals::MissionEvent>(emission.message).phase != signals::MissionPhase::started) {
+    } else if (const auto& event = std::get<signals::MissionEvent>(emission.message);
+               event.phase != signals::MissionPhase::started) {
       const auto of_mission = equations.take();
-      out.findings.push_back(
-          refinement.judge(of_mission, equations.mean_payload_kg(), spec.start_utime_us, true));
+      out.findings.push_back(refinement.judge(of_mission, equations.mean_payload_kg(), event.utime_us, true));
       out.undeclared_kg.push_back(machine.finished().back().undeclared_kg);
     }
   }
@@ -272,11 +272,17 @@ TEST(Refinement, ReportsInseparablePayload) {
     equations.add(s);
   }
   Refinement refinement(robot);
-  const MissionFinding finding = refinement.judge(equations.take(), 0, 1, true);
+  const std::vector<DriveEquation> of_mission = equations.take();
+  const MissionFinding finding = refinement.judge(of_mission, 0, 1, true);
   EXPECT_TRUE(finding.enough);
   EXPECT_TRUE(finding.inseparable);
   EXPECT_FALSE(finding.undeclared);
   EXPECT_GT(finding.undeclared_kg.sd, 0.5 * robot.limits.payload_kg);
+  // Of a log that is replayed again.
+  const auto once = refinement.estimates();
+  (void)refinement.judge(of_mission, 0, 1, true);
+  EXPECT_EQ(refinement.missions(), 1U);
+  EXPECT_EQ(refinement.estimates()[0].sd, once[0].sd);
 }
 
 TEST(Refinement, KeepsMissionsOverNewVersion) {

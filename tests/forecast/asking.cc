@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "answers/json/autonomy_json.h"
+#include "answers/autonomy.h"
 #include "forecast/habit.h"
 
 namespace joulecast::forecast {

@@ -1,5 +1,5 @@
 #include "fuzz.h"
-#include "history/cursor.h"
+#include "history/sql_filter.h"
 
 using namespace joulecast;
 

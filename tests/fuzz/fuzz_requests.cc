@@ -1,9 +1,9 @@
 #include <nlohmann/json.hpp>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
-#include "answers/json/matrix_json.h"
-#include "answers/json/profile_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
+#include "answers/matrix.h"
+#include "answers/profile.h"
 #include "base/json_text.h"
 #include "fuzz.h"
 #include "robot/robot_file.h"

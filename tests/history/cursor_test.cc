@@ -1,7 +1,7 @@
-#include "history/cursor.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+
+#include "history/sql_filter.h"
 
 namespace joulecast::history {
 namespace {

@@ -8,8 +8,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "answers/json/autonomy_json.h"
-#include "answers/json/estimate_json.h"
+#include "answers/autonomy.h"
+#include "answers/estimate.h"
 #include "base/text_file.h"
 #include "ingest/contradiction_watch.h"
 #include "ingest/forecasts.h"
@@ -280,7 +280,8 @@ TEST(Forecasts, ForgetMissionsCompletely) {
   PipelineHarness harness, other;
   Forecasts both(*harness.store), right(*other.store);
   ASSERT_TRUE(both.read(model) && right.read(model));
-  (void)both.learn(model, mission(1, 400));
+  (void)both.learn(model, mission(1, 700));
+  (void)both.learn(model, mission(1, 400));  // replaces the one before
   (void)both.learn(model, mission(2, 9000));
   (void)right.learn(model, mission(1, 400));
   const auto learned = both.forget(model, 2);

@@ -534,6 +534,18 @@ TEST_F(PipelineTest, MissionContinuesAfterAKill) {
   EXPECT_NEAR(missions[0].accounts.measured_j, 48 * 199 * 0.02, 1e-6) << "0.4 s without samples are bridged";
 }
 
+TEST_F(PipelineTest, EndAfterAKillIsKept) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 100);
+  harness.pipeline->tick(start_us + 2'000'000);
+  harness.restart();
+  send(event(MissionPhase::finished, 101));
+  const auto mission = harness.missions().at(0);
+  EXPECT_EQ(mission.state, history::MissionState::finished);
+  EXPECT_FALSE(mission.incomplete) << mission.incomplete_reason;
+  EXPECT_EQ(mission.samples, 100);
+}
+
 TEST_F(PipelineTest, HostClockStepIsNoSilence) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "base/output_file.h"
+#include "base/text_file.h"
 #include "telemetry/signature.h"
 
 namespace joulecast::ingest {

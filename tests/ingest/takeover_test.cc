@@ -6,9 +6,9 @@
 #include <deque>
 #include <functional>
 
+#include "ingest/fleet_view.h"
 #include "ingest/held_messages.h"
 #include "ingest/pipeline.h"
-#include "ingest/snapshot_bytes.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 

@@ -1,5 +1,6 @@
 // Fastest plans within an energy budget against direct transcriptions, which share nothing with the planner
 // but the drive model, and against plans for a value of time.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -102,6 +103,28 @@ TEST(EnergyBudget, RefusesLessThanTheLeast) {
   problem.energy_budget_j = std::stod(text.substr(text.find("less than ") + 10));
   EXPECT_NEAR(*problem.energy_budget_j, least_j, 3e-5 * least_j);
   EXPECT_TRUE(planner->plan(*path, problem));
+}
+
+// As a client does that reads the least energy with ten digits.
+TEST(EnergyBudget, LeastEnergyIsEnough) {
+  const std::vector<std::vector<Segment>> paths{
+      {Straight{7}}, {Straight{3}, Arc{1, 1.2}, Straight{3}}, {Straight{2}, TurnInPlace{1}, Straight{5}}};
+  for (const auto& segments : paths) {
+    const auto path = make_path(segments, PathOptions{.start = {}});
+    Problem problem = rowless(test::amr());
+    const auto least = plan(test::amr(), *path, problem);
+    ASSERT_TRUE(least);
+    const double least_j = std::stod(fmt::format("{:.10g}", least->summary.energy_j));
+    for (const double excess : {0.0, 1e-6, 2e-5, 3e-5}) {
+      problem.energy_budget_j = (1 + excess) * least_j;
+      const auto within = plan(test::amr(), *path, problem);
+      ASSERT_TRUE(within) << excess << ' ' << describe(within.error());
+      EXPECT_LE(within->summary.energy_j, (1 + 1e-9) * *problem.energy_budget_j);
+      EXPECT_LE(within->summary.duration_s, (1 + 1e-6) * least->summary.duration_s);
+    }
+    problem.energy_budget_j = (1 - 1e-6) * least_j;
+    EXPECT_FALSE(plan(test::amr(), *path, problem));
+  }
 }
 
 TEST(EnergyBudget, AmpleBudgetGivesTheFastest) {

@@ -25,7 +25,7 @@ double driven_j(const DriveLoads& loads, const Run& run, const std::vector<doubl
     const double span = time_s[k + 1] - time_s[k], rate = (speed[k + 1] - speed[k]) / span;
     for (int i = 0; i < steps; ++i) {
       const double v = speed[k] + rate * span * (i + 0.5) / steps;
-      sum += span / steps * loads.model().flow(loads.instant(run, run.at(0), 0, v, rate)).battery_power_w;
+      sum += span / steps * loads.model().flow(loads.instant(run, run.at(0), v, rate)).battery_power_w;
     }
   }
   return sum;

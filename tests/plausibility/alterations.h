@@ -67,14 +67,6 @@ inline void round_to(telemetry::RecordingSet& set, std::initializer_list<std::si
   });
 }
 
-inline void clip(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double most) {
-  each_sample(set, [&](Sample& s) {
-    for (const std::size_t k : readings)
-      *signals::numbers_of(s)[k] = std::clamp(*signals::numbers_of(s)[k], -most, most);
-  });
-}
-
-// Delays the readings.
 inline void delay(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double delay_s) {
   for (Recording& mission : set.missions) {
     const std::vector<Sample> before = mission.samples;

@@ -71,7 +71,6 @@ TEST(MotorConstants, ReturnsConstantsPerMotor) {
     const Truth truth = k == 0 ? Truth{} : left;
     EXPECT_NEAR(m[k].resistance_ohm.value, truth.resistance, 0.05);
     EXPECT_NEAR(m[k].constant_v_s_rad.value, truth.constant, 0.01);
-    EXPECT_NEAR(m[k].drop_v.value, truth.drop, 0.06);
     EXPECT_NEAR(m[k].steady_current_a.value, truth.friction + truth.viscous * m[k].mean_speed_rad_s, 0.1);
     EXPECT_NEAR(m[k].current_per_rad_s2_a.value, truth.inertia, 0.05);
     EXPECT_TRUE(m[k].resistance_ohm.sure());

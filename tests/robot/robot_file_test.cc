@@ -269,6 +269,7 @@ TEST(BatteryFile, MatchesBatteryObject) {
   const auto battery = parse_battery(to_json_text(model.battery));
   ASSERT_TRUE(battery) << describe(battery.error());
   EXPECT_EQ(*battery, model.battery);
+  EXPECT_EQ(parse_battery(to_json_text(model)), model.battery);
   json document = battery_to_json(model.battery);
   document.erase("capacity_ah");
   document["robot_id"] = "x";

@@ -11,6 +11,7 @@
 #include "access/token.h"
 #include "server/api/services.h"
 #include "server/embedded.h"
+#include "server/http/admission.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
 #include "server/http/http_server.h"
@@ -389,10 +390,11 @@ TEST_F(AccessTest, BoundsSignInsOfOneToken) {
   EXPECT_EQ(ask(Method::get, "/v1/robots", "", value).status, 200U) << "another token's session was ended";
 }
 
-TEST(Loopback, AcceptsLoopbackAddressesOnly) {
-  for (const char* address : {"127.0.0.1", "127.9.9.9", "::1"}) EXPECT_TRUE(is_loopback(address)) << address;
-  for (const char* address : {"0.0.0.0", "::", "192.0.2.7", "localhost", ""})
-    EXPECT_FALSE(is_loopback(address)) << address;
+TEST(Addresses, RejectNames) {
+  EXPECT_TRUE(address_of("::1", "http.address").value().is_loopback());
+  EXPECT_FALSE(address_of("192.0.2.7", "http.address").value().is_loopback());
+  for (const char* name : {"localhost", ""})
+    EXPECT_EQ(address_of(name, "http.address").error().field, "http.address") << name;
 }
 
 }  // namespace

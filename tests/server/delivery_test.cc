@@ -1,4 +1,6 @@
 // Digits, tags and content codings of answers.
+#include "server/http/delivery.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -10,9 +12,7 @@
 #include <string>
 
 #include "base/text.h"
-#include "server/http/content_coding.h"
 #include "server/http/cors.h"
-#include "server/http/json_digits.h"
 #include "server/http/router.h"
 #include "server/http/text.h"
 

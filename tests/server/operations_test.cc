@@ -9,7 +9,6 @@
 
 #include "server/api/services.h"
 #include "server/http/event_hub.h"
-#include "server/http/http_metrics.h"
 #include "server/http/openapi.h"
 #include "server/http/static_files.h"
 #include "server/logging.h"

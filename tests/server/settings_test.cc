@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -193,6 +194,21 @@ TEST_F(SettingsTest, SetsMembersOfEachKind) {
         "ingest.reorder_s = 0.25 ", "store.retention_days = 0 ", "store.retention_bytes = 12 ",
         "mqtt.dialect = \"vda5050-2.1\"", "store.synchronous = \"normal\"", "watch.diagnose = false "})
     EXPECT_NE(read->settings.print().find(line), std::string::npos) << line << read->settings.print();
+}
+
+TEST(CheckConfig, ReportsUnusableAddresses) {
+  DaemonOptions options;
+  options.http.address = "localhost";
+  options.http.trusted_proxies = {"proxy"};
+  options.ingest.lcm_url = "udpm://10.0.0.1:7667";
+  std::vector<std::string> fields;
+  for (const Error& fault : faults_of(options)) {
+    fields.push_back(fault.field);
+    if (fault.field != "http.address") continue;
+    EXPECT_EQ(fault.message, "must be an IPv4 or IPv6 address, is localhost");
+  }
+  for (const char* field : {"http.address", "http.trusted_proxies", "lcm.url"})
+    EXPECT_EQ(std::ranges::count(fields, field), 1) << field;
 }
 
 }  // namespace

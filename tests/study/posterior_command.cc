@@ -76,7 +76,7 @@ ordered_json list(const Items& items) {
   return out;
 }
 
-ordered_json to_json(const gap::posterior::Explained& a) {
+ordered_json to_json(const gap::posterior::Explained& a, const gap::posterior::Fit& fit) {
   const auto& h = a.held_out;
   return {{"verdict", gap::name_of(a.verdict)},
           {"verdict_probability", a.probability},
@@ -100,11 +100,10 @@ ordered_json to_json(const gap::posterior::Explained& a) {
           {"detectable", number(a.detectable)},
           {"repeats", {{"file", number(a.repeats_file)}, {"left", number(a.repeats_left)}}},
           {"tolerance_factors", a.factors},
-          {"log_evidence", a.log_evidence},
-          {"rows", a.rows},
-          {"blocks", a.blocks},
-          {"models", a.models},
-          {"steps", a.steps},
+          {"rows", fit.data.rows.size()},
+          {"blocks", fit.data.blocks},
+          {"models", fit.models.size()},
+          {"steps", fit.steps},
           {"reasons", a.reasons}};
 }
 
@@ -113,13 +112,14 @@ Exit run(const PosteriorOptions& options) {
   if (!robot) return report(robot.error());
   const auto recordings = telemetry::load_recordings(options.logs, robot->robot_id);
   if (!recordings) return report(recordings.error());
-  const auto explained = gap::posterior::explain_recordings(*recordings, *robot);
-  if (!explained) return report(explained.error());
-  std::printf("%s\n", to_json(*explained).dump().c_str());
+  const auto fit = gap::posterior::fit_missions(recordings->missions, *robot);
+  if (!fit) return report(fit.error());
+  const gap::posterior::Explained explained = gap::posterior::explain(**fit);
+  std::printf("%s\n", to_json(explained, **fit).dump().c_str());
   if (options.apply.empty()) return Exit::ok;
-  if (!explained->adopts) return report({Fault::conflict, "--apply", "the held-out error does not fall"});
+  if (!explained.adopts) return report({Fault::conflict, "--apply", "the held-out error does not fall"});
   std::vector<robot::AdoptedEffect> found;
-  for (const dynamics::ActiveEffect& effect : explained->model) found.push_back(dynamics::adopt(effect));
+  for (const dynamics::ActiveEffect& effect : explained.model) found.push_back(dynamics::adopt(effect));
   const auto extended = gap::with_effects(*robot, found);
   if (!extended) return report(extended.error());
   if (const auto written = write_text_file(options.apply, robot::to_json_text(*extended), Existing::replace);

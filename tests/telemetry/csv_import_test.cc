@@ -253,6 +253,10 @@ TEST(CsvImport, ErrorsNameLineAndColumn) {
   EXPECT_THAT(import_csv("t,r\n0,1\n", mapping_of("")).error().message, HasSubstr("'l' is missing"));
   EXPECT_THAT(import_csv("t,r,l\n0,,\n", mapping_of("")).error().message,
               HasSubstr("1 of 1 rows of missions would be lost: 0 have the time"));
+  EXPECT_THAT(import_csv("t,r,l\n", mapping_of("")).error().message, HasSubstr("no row of numbers"));
+  const ImportOptions before_1970{"x.csv", {}, {}, -1'000'000};
+  EXPECT_THAT(import_csv("t,r,l\n7,1,1\n", mapping_of(""), before_1970).error().message,
+              HasSubstr("'1969-12-31T23:59:59Z' is not between the years 1970 and 2100"));
 }
 
 const signals::CovariateSeries& series_called(const Recording& recording, const std::string& name) {

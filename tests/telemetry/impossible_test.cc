@@ -122,6 +122,14 @@ TEST(ImpossibleReadings, FrozenChannelsAreDropped) {
   }
 }
 
+// A robot that rolls with its motors off: neither voltage nor current, and no error of a sensor.
+TEST(ImpossibleReadings, MotorOffIsNoError) {
+  std::vector<Recording> one{drive(testing::nomad())};
+  for (std::size_t k = 600; k < 720; ++k)
+    one[0].samples[k].motor_voltage_v = one[0].samples[k].motor_current_a = {0, 0};
+  EXPECT_TRUE(dropped_of(one).empty());
+}
+
 TEST(ImpossibleReadings, SlowChannelsAreNotFrozen) {
   const Recording sound = drive(testing::nomad());
   for (const std::size_t rows : {10u, 40u}) {  // a reading in 0.5 s, and in 2 s

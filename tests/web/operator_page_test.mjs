@@ -1706,6 +1706,7 @@ async function markAll(shown) {
         incomplete: true,
         findings: { payload },
         mission_id: `${m.robot_id}-261123-200923-m132`,
+        robot_id: `${m.robot_id}-north-hall-reach-truck-line-042`,
       });
   });
   const longAgo = { live: false, silent_s: 1e8, faults: { missing: 66, out_of_order: 3 } };

@@ -163,18 +163,6 @@ TEST(PowerRows, LastHalfSecondWithoutOverlap) {
   }
 }
 
-TEST(PowerRows, DelayedRowsHaveSlopes) {
-  const std::vector missions{power_only(60, [](double t) { return 4 + std::sin(t); })};
-  WindowSettings settings;
-  settings.electrical_delay_s = 0.3;
-  for (const Window& w : make_windows(missions, testing::nomad(), find_readings(missions), settings)) {
-    if (w.t_s > 58) continue;  // readings that lag end before the motion does
-    EXPECT_EQ(w.electrical_shift_s, 0.3);
-    EXPECT_NEAR(w.battery_power_w, 25 * (2 + 0.1 * (w.t_s + 0.3)), 1e-6);
-    EXPECT_NEAR(w.battery_power_slope_w_s, 2.5, 1e-6);
-  }
-}
-
 TEST(PowerRows, KeepStartsAndStops) {
   // At rest for four seconds of eight, then at 5 rad/s at once: no reading is left out.
   const std::vector missions{power_only(64, [](double t) { return std::fmod(t, 8) < 4 ? 0.0 : 5.0; })};

@@ -111,7 +111,6 @@ TEST(Track, ComputesBatteryState) {
     s.battery_current_a = t < 10 ? 3 : signals::unmeasured;
   });
   const Track c = track_of(mission);
-  EXPECT_NEAR(c.battery_voltage_step_v, 0.5, 1e-12);
   EXPECT_NEAR(c.battery_power[300], 3 * 23.5, 1e-12);
   EXPECT_TRUE(std::isnan(c.battery_power[700]));
   EXPECT_NEAR(c.charge[400], 3 * 8, 1e-9);

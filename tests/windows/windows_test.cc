@@ -59,7 +59,6 @@ TEST_P(AnyRate, KeepsMeansAndSlopes) {
     EXPECT_NEAR(w.current_slope_a_s[1], -0.1, 1e-9);
     EXPECT_NEAR(w.battery_voltage_v, 25 - 0.01 * t, off);
     EXPECT_NEAR(w.battery_current_a, 2 + 0.3 * t, off);
-    EXPECT_NEAR(w.battery_current_slope_a_s, 0.3, 1e-9);
     EXPECT_NEAR(w.yaw_rate_rad_s, 0.4, 1e-12);
     EXPECT_NEAR(w.x_m, t, off);
     EXPECT_NEAR(w.y_m, 3 * t, 3 * off);
@@ -89,10 +88,9 @@ TEST(Windows, AllFiniteChannelsStayFinite) {
       for (const auto& part : w.part_speed_rad_s) EXPECT_TRUE(std::isfinite(part[s]));
     }
     EXPECT_TRUE(std::isfinite(w.battery_voltage_v + w.battery_current_a + w.battery_power_w));
-    EXPECT_TRUE(std::isfinite(w.battery_power_slope_w_s + w.battery_current_slope_a_s + w.charge_as));
+    EXPECT_TRUE(std::isfinite(w.battery_power_slope_w_s + w.charge_as));
     EXPECT_TRUE(std::isfinite(w.yaw_rate_rad_s + w.x_m + w.y_m + w.heading_rad));
     EXPECT_NEAR(w.battery_voltage_v, 24, 1e-9);
-    EXPECT_EQ(w.battery_voltage_step_v, 0);
   }
 }
 
@@ -288,17 +286,6 @@ TEST(Windows, DerivesClimb) {
   high.covariates = {height};
   for (const Window& w : windows_of({pitched, high}))
     EXPECT_NEAR(w.climb_rad, w.mission == 0 ? 0.01 * w.t_s : -std::asin(0.03), w.mission == 0 ? 1e-4 : 1e-6);
-}
-
-TEST(Windows, CurrentSignExcludesBias) {
-  const auto mission = testing::recorded(500, 50, [](double, Sample& s) {
-    s.wheel_velocity_rad_s = {3, 3};
-    s.motor_current_a = {0.4, 0.4};
-  });
-  WindowSettings settings;
-  EXPECT_GT(windows_of({mission}, settings).back().current_sign[0], 0.5);
-  settings.motor_current_bias_a = 0.8;
-  EXPECT_LT(windows_of({mission}, settings).back().current_sign[0], -0.5);
 }
 
 TEST(Windows, RemovesElectricalDelay) {

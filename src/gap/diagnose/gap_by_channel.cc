@@ -69,7 +69,7 @@ std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit) {
   for (std::size_t k = 0; k < d.windows.size(); ++k) {
     const Window& w = d.windows[k];
     terminals.add(0, d.battery_voltage_v[k]);
-    turning.add(residuals(model, w, {})[index_of(Channel::gyro)], w.yaw_rate_rad_s);
+    turning.add(residuals(model, w, false)[index_of(Channel::gyro)], w.yaw_rate_rad_s);
     const double read_w = motors_power(w, d.robot, volts_read);
     if (!std::isfinite(read_w)) continue;
     motors.add(read_w - metered_powers(model, w).motors_w, read_w);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <tuple>
 
 #include "base/try.h"
 #include "gap/diagnose/gap_by_channel.h"
@@ -41,6 +42,14 @@ void state_correction(Check& check) {
       std::isfinite(check.probability) ? " (probability " + probability_text(check.probability) + ")" : "");
 }
 
+// (E_measured - E_model) / E_measured, and the integral of |P_measured - P_model| over that of |P_measured|.
+using GapSize = std::pair<double, double>;
+
+GapSize gap_size(const posterior::Data& data, const Eigen::VectorXd& modelled_w) {
+  const Eigen::VectorXd measured_w = data.rows.measured_w(), apart_w = measured_w - modelled_w;
+  return {apart_w.sum() / measured_w.sum(), apart_w.lpNorm<1>() / measured_w.lpNorm<1>()};
+}
+
 class Diagnoser {
  public:
   Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
@@ -53,26 +62,30 @@ class Diagnoser {
     d_.robot_id = recordings_.robot_id;
     d_.missions = recordings_.missions.size();
     d_.samples = recordings_.samples;
-    TRY_ASSIGN(adopted_, dynamics::active_effects(robot_));
-    if (!prepare()) return nothing_to_judge();
-    measure();
+    TRY(dynamics::active_effects(robot_));
+    const windows::Readings readings = windows::find_readings(recordings_.missions);
+    d_.motor_channels = readings.motor_currents;
+    d_.power = readings.battery_power    ? PowerSource::battery
+               : readings.motor_currents ? PowerSource::motors
+                                         : PowerSource::none;
     const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
     double part = 0;
     Result<std::unique_ptr<posterior::Fit>> fitted = posterior::fit_missions(
         recordings_.missions, robot_, [&] { return goes_on(part = std::min(part + of_step, after_walk)); });
-    if (!fitted) return nothing_to_judge();
+    if (!fitted) return nothing_to_judge(false);
     fit_ = std::move(*fitted);
     if (!fit_ || !goes_on(after_walk)) return cancelled();
-    if (fit_->equations.channels.empty()) return nothing_to_judge();
+    if (fit_->equations.channels.empty() || (d_.power == PowerSource::none && !readings.motor_voltages))
+      return nothing_to_judge(true);
+    measure();
     answer_ = posterior::explain(*fit_);
     if (!goes_on(after_answer)) return cancelled();
     state_effects();
     state_outside();
-    find_ripple_of_wheels();
+    if (!readings.held()) find_ripple_of_wheels();
     compare();
     lower_noise_floor();
-    state_offer(
-        *fit_, answer_, [this](const auto& effect) { return moved_w(effect); }, true, d_);
+    state_offer(*fit_, answer_, true, d_);
     weigh_by_checks(d_);
     finish();
     return std::move(d_);
@@ -80,56 +93,29 @@ class Diagnoser {
 
  private:
   bool goes_on(double part) const { return !progress_ || progress_(part); }
-  std::vector<double> modelled(std::span<const Cause> causes) const {
-    return modelled_power(robot_, adopted_, causes, windows_);
-  }
 
-  // Returns false if the data are insufficient for a diagnosis.
-  bool prepare() {
-    readings_ = windows::find_readings(recordings_.missions);
-    windows_ = windows::make_windows(recordings_.missions, robot_, readings_);
-    keep_known_motion(windows_);
-    power_w_ = measured_power(windows_, robot_, false);
-    const auto moves = [](const Window& w) {
-      const auto settled = [&](std::size_t side) { return w.moving[side] || w.resting[side]; };
-      return w.reading || (settled(0) && settled(1));
-    };
-    motion_known_ =
-        static_cast<std::size_t>(std::ranges::count_if(windows_, moves)) >= posterior::fewest_windows;
-    d_.motor_channels = readings_.motor_currents;
-    const auto known = [](double p) { return std::isfinite(p); };
-    d_.power = PowerSource::battery;
-    if (std::ranges::none_of(power_w_, known)) {
-      d_.power = PowerSource::motors;
-      power_w_ = measured_power(windows_, robot_, true);
-      if (std::ranges::none_of(power_w_, known)) d_.power = PowerSource::none;
-    }
-    if (d_.power == PowerSource::motors && !voltages_read(windows_))
-      d_.notes.emplace_back(
-          "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
-          "robot file's windings need for them.");
-    return motion_known_ && (d_.power == PowerSource::battery || readings_.motor_currents ||
-                             from_motion_of(readings_).voltage);
-  }
-
-  Diagnosis nothing_to_judge() {
+  // `motion_known`: for long enough.
+  Diagnosis nothing_to_judge(bool motion_known) {
     d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
     // Without power another drive with the same channels is of no use.
-    if (!motion_known_ || d_.power != PowerSource::none) d_.next_drive = first_drives(robot_);
+    if (!motion_known || d_.power != PowerSource::none) d_.next_drive = first_drives(robot_);
     d_.refusal = "no change of the robot file was found";
-    d_.reasons.push_back(missing_data(d_, motion_known_));
+    d_.reasons.push_back(missing_data(d_, motion_known));
     return std::move(d_);
   }
 
   void measure() {
+    const posterior::Data& data = fit_->data;
+    d_.power = power_source(data);
     if (d_.power == PowerSource::none) {
       d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
       return;
     }
-    model_w_ = modelled({});
-    const GapSize size = gap_size(power_w_, model_w_);
-    d_.energy_relative = size.energy_relative;
-    d_.power_absolute_relative = size.absolute_relative;
+    if (d_.power == PowerSource::motors && !voltages_read(data.windows))
+      d_.notes.emplace_back(
+          "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
+          "robot file's windings need for them.");
+    std::tie(d_.energy_relative, d_.power_absolute_relative) = gap_size(data, fit_->unchanged_w);
   }
 
   void state_effects() {
@@ -139,11 +125,9 @@ class Diagnoser {
   }
 
   // Searches for a line in the spectrum over the wheels' angle: windows average it out and keep its mean,
-  // which looks like friction. Skipped where readings are repeated over rows: these rows repeat with the
-  // wheel.
+  // which looks like friction. Readings that are repeated over rows would repeat with the wheel.
   void find_ripple_of_wheels() {
-    if (readings_.held()) return;
-    std::vector<dynamics::ActiveEffect> effects = adopted_;
+    std::vector<dynamics::ActiveEffect> effects = fit_->data.in_file;
     effects.insert(effects.end(), answer_.model.begin(), answer_.model.end());
     const std::optional<Ripple> ripple =
         find_ripple(recordings_, robot_, effects, d_.motor_channels, ripple_surrogates);
@@ -172,7 +156,7 @@ class Diagnoser {
         !d_.outside.channel.starts_with("battery_power"))
       return;
     d_.outside.like = "accessory_load";
-    d_.outside.power_w = load_by_time(causes());
+    d_.outside.power_w = load_by_time();
   }
 
   // Held-out errors of the file, the explanation and the regression.
@@ -211,54 +195,27 @@ class Diagnoser {
     if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / d_.noise_floor;
   }
 
-  // Mean |change of power| by one effect [W]; 0 without power.
-  double moved_w(const dynamics::ActiveEffect& effect) const {
-    if (d_.power == PowerSource::none) return 0;
-    const std::vector<double> with = modelled(std::array{Cause{effect, 0, std::nullopt}});
-    double moved = 0, count = 0;
-    for (std::size_t k = 0; k < with.size(); ++k) {
-      if (!std::isfinite(with[k] - model_w_[k])) continue;
-      moved += std::fabs(with[k] - model_w_[k]);
-      count += 1;
-    }
-    return moved / std::max(count, 1.0);
-  }
-
-  // The causes of the model that predicts best; covariates with the strengths of the effects.
-  std::vector<Cause> causes() const {
-    std::vector<Cause> all;
-    for (const dynamics::ActiveEffect& effect : answer_.model) all.push_back({effect, 0, std::nullopt});
-    for (const ExplainedBy& e : answer_.effects) {
-      if (dynamics::find_effect(e.id) != nullptr) continue;
-      const Hypothesis& h = fit_->catalogue.hypotheses[e.hypothesis];
-      all.push_back(h);
-      all.back().effect.values[h.parameter] = e.parameters.front().value;
-    }
-    return all;
-  }
-
-  // For a load independent of motion: the power beyond the other causes in the first and in the last third of
+  // The power of a load independent of motion, beyond the other causes, in the first and in the last third of
   // the time since a mission began.
-  std::array<double, 2> load_by_time(std::span<const Cause> causes) const {
-    std::vector<Cause> others(causes.begin(), causes.end());
-    std::erase_if(others,
-                  [](const Cause& c) { return !c.by && c.effect.effect->info().id == "accessory_load"; });
-    const std::vector<double> model = modelled(others);
+  std::array<double, 2> load_by_time() const {
+    const auto load =
+        std::ranges::find(answer_.model, "accessory_load", [](const auto& e) { return e.effect->info().id; });
+    const double load_w = load == answer_.model.end() ? 0 : load->values[0];
+    const posterior::PowerRows& rows = fit_->data.rows;
     double end_s = 0;
-    for (const Window& w : windows_) end_s = std::max(end_s, w.t_s);
+    for (const Window& w : rows.instants) end_s = std::max(end_s, w.t_s);
     std::array<double, 2> sum{}, count{};
-    for (std::size_t k = 0; k < model.size(); ++k) {
-      const double t_s = windows_[k].t_s;
-      if (!std::isfinite(power_w_[k]) || (t_s > end_s / 3 && t_s < 2 * end_s / 3)) continue;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const double t_s = rows.window(r).t_s;
+      if (t_s > end_s / 3 && t_s < 2 * end_s / 3) continue;
       const std::size_t at = t_s > end_s / 3 ? 1 : 0;
-      sum[at] += power_w_[k] - model[k];
+      sum[at] += rows.power_w[r] - answer_.explained_w[posterior::ix(r)] + load_w;
       count[at] += 1;
     }
     return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
   }
 
   void finish() {
-    const std::vector<Cause> found = d_.verdict == Verdict::none ? std::vector<Cause>{} : causes();
     d_.reasons = reasons_for(d_, d_.baseline && d_.baseline->wins());
     for (const std::string& reason : answer_.reasons) d_.reasons.push_back(sentence(reason));
     d_.next_drive = next_drives(*fit_, d_.effects);
@@ -267,19 +224,20 @@ class Diagnoser {
       d_.next_drive.insert(d_.next_drive.begin(), more.begin(), more.end());
     }
     if (d_.power == PowerSource::none) return;
+    const posterior::PowerRows& rows = fit_->data.rows;
+    std::vector<Window> windows;
+    for (std::size_t r = 0; r < rows.size(); ++r) windows.push_back(rows.window(r));
+    const auto all = [](const Eigen::VectorXd& v) { return std::span(v.data(), posterior::ux(v.size())); };
+    const auto before = all(fit_->unchanged_w),
+               after = d_.verdict == Verdict::none ? before : all(answer_.explained_w);
     if (d_.verdict != Verdict::none)
-      d_.where = localise(windows_, robot_, adopted_, power_w_, model_w_, d_.noise_floor);
-    d_.figures = figures_of(windows_, power_w_, model_w_, modelled(found), recordings_, robot_);
+      d_.where = localise(windows, robot_, fit_->data.in_file, rows.power_w, before, d_.noise_floor);
+    d_.figures = figures_of(windows, rows.power_w, before, after, recordings_, robot_);
   }
 
   const telemetry::RecordingSet& recordings_;
   const robot::RobotModel& robot_;
   const Progress& progress_;
-  std::vector<dynamics::ActiveEffect> adopted_;
-  windows::Readings readings_;
-  bool motion_known_ = false;  // for long enough
-  std::vector<Window> windows_;
-  std::vector<double> power_w_, model_w_;  // of windows_: measured, and by the robot file
   std::unique_ptr<posterior::Fit> fit_;
   Explained answer_;
   Diagnosis d_;
@@ -287,12 +245,9 @@ class Diagnoser {
 
 // The gap of recordings before readings are moved.
 GapSize gap_as_read(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
-  std::vector<Window> windows =
-      windows::make_windows(recordings.missions, robot, windows::find_readings(recordings.missions));
-  keep_known_motion(windows);
-  const std::vector<dynamics::ActiveEffect> in_file =
-      dynamics::active_effects(robot).value_or(std::vector<dynamics::ActiveEffect>{});
-  return gap_size(measured_power(windows, robot, false), modelled_power(robot, in_file, {}, windows));
+  const auto data = posterior::make_data(recordings.missions, robot);
+  return data && data->power ? gap_size(*data, posterior::predicted_power(*data, data->in_file))
+                             : GapSize{missing, missing};
 }
 
 // Adds the delay that checks measured, and that was removed from the readings, to the answer. `as_read`: the
@@ -319,8 +274,8 @@ void add_delay(Diagnosis& d, const Check& check, const GapSize& as_read) {
   if (d.power != PowerSource::battery) return;
   if (!d.shrinkage) d.shrinkage.emplace().after = d.power_absolute_relative;
   Shrinkage& s = *d.shrinkage;
-  d.energy_relative = as_read.energy_relative;
-  s.before = d.power_absolute_relative = as_read.absolute_relative;
+  std::tie(d.energy_relative, d.power_absolute_relative) = as_read;
+  s.before = d.power_absolute_relative;
   s.fraction = 1 - s.after / s.before;
   s.interval = {missing, missing};
   s.remaining_over_noise_floor = s.after / d.noise_floor;

@@ -96,12 +96,6 @@ std::string_view name_of(Channel channel) {
   return "";
 }
 
-FromMotion from_motion_of(const windows::Readings& readings) {
-  FromMotion from_motion{!readings.motor_currents, !readings.motor_currents && readings.motor_voltages};
-  from_motion.kinematics = !from_motion.alone() || !readings.battery_power;
-  return from_motion;
-}
-
 template <class S>
 MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const auto& p = model.parameters();
@@ -133,8 +127,7 @@ void keep_known_motion(std::vector<Window>& windows) {
 }
 
 template <class S>
-ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w,
-                           const FromMotion& from_motion) {
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, bool no_currents) {
   const auto& p = model.parameters();
   const S delay = p.sensor_delay_s - w.electrical_shift_s;  // that the windows still contain
   ChannelValues<S> r;
@@ -168,7 +161,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
       r[index_of(Channel::torque_right) + s] =
           reading - (S(1) + p.motor_current.gain) * model.current_for(torque_nm[s]) - p.motor_current.bias;
     }
-    if (from_motion.voltage && !w.motors_apart && (w.moving[s] || w.resting[s])) {
+    if (no_currents && !w.motors_apart && (w.moving[s] || w.resting[s])) {
       const S asked = w.resting[s] ? S(0) : model.voltage_for(s, model.current_for(torque_nm[s]), at);
       r[index_of(Channel::drive_right) + s] = w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
                                               (S(1) + p.motor_voltage.gain) * asked - p.motor_voltage.bias;
@@ -181,14 +174,11 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   const S bus = p.idle_power_w + p.accessory_power_w + motor_power[0] + motor_power[1] +
                 p.driver_loss * motor_abs + p.unreturned * braking;
   r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.mission_voltage_v);
-  if (from_motion.power)
-    r[index_of(Channel::power)] = S(w.battery_power_w) - metered_powers(model, w).battery_w;
   // The difference of the open-circuit voltage from the nominal one is a nuisance of its own.
   r[index_of(Channel::battery_voltage)] =
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
       p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /
           (S(1) + p.battery_current.gain);
-  if (!from_motion.kinematics) return r;
   r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - yaw_rate_rad_s;
   const S grip = S(1) - p.slip;
   const S right = p.wheel_radius_m[0] * grip * w.span_angle_rad[0],
@@ -200,9 +190,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
 
 template MeteredPower<double> metered_powers(const dynamics::BasicDriveModel<double>&, const Window&);
 template MeteredPower<Dual> metered_powers(const dynamics::BasicDriveModel<Dual>&, const Window&);
-template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&,
-                                         const FromMotion&);
-template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&,
-                                       const FromMotion&);
+template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&, bool);
+template ChannelValues<Dual> residuals(const dynamics::BasicDriveModel<Dual>&, const Window&, bool);
 
 }  // namespace joulecast::gap

@@ -41,27 +41,15 @@ std::string_view name_of(Channel channel);
 template <class S>
 using ChannelValues = std::array<S, channel_count>;
 
-// The channels that are evaluated from motion alone because the motors' currents are not measured.
-struct FromMotion {
-  bool power = false;    // Channel::power is used; it costs as much as the others together
-  bool voltage = false;  // Channel::drive_right and drive_left are used
-  // The gyro and the map are equations; with battery power alone, checks compare them instead.
-  bool kinematics = true;
-  bool alone() const { return power && !voltage; }
-};
-
-// How recordings with these readings are evaluated.
-FromMotion from_motion_of(const windows::Readings& readings);
-
-// Residuals of one window. Value NaN: the channel is unavailable here.
+// Residuals of one window; that of Channel::power has rows of its own. Value NaN: the channel is unavailable
+// here. `no_currents`: no motor's current was measured, drive_right and drive_left are used.
 template <class S>
-ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w,
-                           const FromMotion& from_motion);
+ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, bool no_currents);
 
 extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<double>&, const Window&,
-                                                const FromMotion&);
+                                                bool);
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
-                                                        const Window&, const FromMotion&);
+                                                        const Window&, bool);
 
 // Removes windows with unknown motion.
 void keep_known_motion(std::vector<Window>& windows);

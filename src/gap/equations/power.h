@@ -3,7 +3,6 @@
 #include <span>
 #include <vector>
 
-#include "gap/equations/cause.h"
 #include "gap/equations/channels.h"
 
 namespace joulecast::gap {
@@ -19,22 +18,8 @@ double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_
 // voltages that the file's windings need. NaN without both currents.
 double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_read);
 
-// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: the power of the motors
-// and the idle power of the robot file in its place.
-std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
-                                   bool of_motors);
-
-// Returns the battery power by the robot file with its own effects (`adopted`) and these causes in force, as
-// the robot's meter would read it.
-std::vector<double> modelled_power(const robot::RobotModel& robot,
-                                   std::span<const dynamics::ActiveEffect> adopted,
-                                   std::span<const Cause> causes, std::span<const Window> windows);
-
-struct GapSize {
-  double energy_relative = 0;    // (E_measured - E_model) / E_measured
-  double absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|
-};
-
-GapSize gap_size(std::span<const double> measured_w, std::span<const double> modelled_w);
+// Battery power of every window [W], NaN where it was not read; where no window has one, the power of the
+// motors and the idle power of the robot file.
+std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

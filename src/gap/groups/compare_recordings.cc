@@ -5,6 +5,7 @@
 #include "base/try.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/groups/comparer.h"
+#include "gap/verdict/answer.h"
 
 namespace joulecast::gap {
 namespace {
@@ -33,9 +34,7 @@ void describe(const telemetry::RecordingSet& recordings, const posterior::Data& 
   c.diagnosis.samples = recordings.samples;
   c.diagnosis.notes = recordings.notes;
   c.diagnosis.motor_channels = d.motors;
-  const bool battery =
-      std::ranges::any_of(d.windows, [](const Window& w) { return std::isfinite(w.battery_power_w); });
-  c.diagnosis.power = !d.power ? PowerSource::none : battery ? PowerSource::battery : PowerSource::motors;
+  c.diagnosis.power = power_source(d);
   add_limits(d, c);
 }
 
@@ -90,7 +89,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
     if (count[k] < min_group_windows)
       return invalid("log", "holds too little motion in group " + c.groups[k].name);
   }
-  if (!data.power && data.from_motion.alone())
+  if (!data.power && !data.motors && !data.voltages)
     return invalid("log", "measures neither power nor voltage nor current of the motors");
   describe(trusted, data, c);
   // Rows are equally long.

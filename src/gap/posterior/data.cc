@@ -50,6 +50,7 @@ void add_readings(const windows::Track& c, double period_s, double voltage_v, st
   const auto row_of = [&](std::size_t n) {
     return length_s > 0 ? std::floor(c.time_s[at[n]] / length_s) : static_cast<double>(n);
   };
+  double last_s = 0;
   for (std::size_t n = 0; n < at.size();) {
     std::size_t end = n;
     double sum = 0;
@@ -60,6 +61,9 @@ void add_readings(const windows::Track& c, double period_s, double voltage_v, st
       rows.instants.back().mission = mission;
       rows.instants.back().battery_voltage_v = voltage_v;
     }
+    Window& row = rows.instants[rows.first.back()];
+    row.continues = n > 0 && row.t_s - last_s < 2 * std::max(length_s, fresh.period_s);
+    last_s = row.t_s;
     rows.first.push_back(rows.instants.size());
     rows.power_w.push_back(sum / static_cast<double>(count));
     n = end;
@@ -122,16 +126,16 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.windows = windows::make_windows(missions, robot, readings,
                                     {.electrical_delay_s = electrical_delay_s, .most_windows = most_windows});
   keep_known_motion(d.windows);
-  if (d.windows.size() < fewest_windows) return fail(Fault::invalid, "", "too little known motion");
+  const auto whole = [](const Window& w) { return w.reading || windows::steady(w); };
+  if (static_cast<std::size_t>(std::ranges::count_if(d.windows, whole)) < fewest_windows)
+    return fail(Fault::invalid, "", "too little known motion");
   const auto share = [&](const auto& known) {
     return static_cast<double>(std::ranges::count_if(d.windows, known)) /
            static_cast<double>(d.windows.size());
   };
   d.motors = share([](const Window& w) { return std::isfinite(w.current_a[0] + w.current_a[1]); }) > few;
-  d.from_motion.power = !d.motors;
-  d.from_motion.voltage = !d.motors && share([](const Window& w) {
-                                         return std::isfinite(w.voltage_v[0] + w.voltage_v[1]);
-                                       }) > few;
+  d.voltages = !d.motors &&
+               share([](const Window& w) { return std::isfinite(w.voltage_v[0] + w.voltage_v[1]); }) > few;
 
   std::vector<double> length_s, voltage_v;
   std::vector<windows::Track> tracks;
@@ -150,10 +154,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   }
   d.blocks = assign(d.windows, length_s);
   if (d.motors) {
-    const auto known = [](double p) { return std::isfinite(p); };
-    std::vector<double> power_w = measured_power(d.windows, robot, false);
-    if (std::ranges::none_of(power_w, known)) power_w = measured_power(d.windows, robot, true);
-    d.rows = rows_of(d.windows, power_w);
+    d.rows = rows_of(d.windows, measured_power(d.windows, robot));
   } else {
     for (std::size_t m = 0; m < missions.size(); ++m)
       add_readings(tracks[m], windows::median_period_s(missions[m]), voltage_v[m], m,
@@ -178,7 +179,7 @@ Data rows_of_witness(const Data& data, Witness witness, const Eigen::VectorXd& f
   std::ranges::copy(factors, d.factor_prior.begin());
   d.power = false;
   d.rows = {};
-  d.from_motion = {};
+  d.voltages = false;
   return d;
 }
 

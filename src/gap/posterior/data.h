@@ -93,9 +93,9 @@ struct Data {
   std::vector<std::size_t> group;  // of each mission, where groups are compared
   bool motors = false;             // motor currents were recorded
   bool power = false;              // battery power (or that of the motors, in its place) was recorded
-  FromMotion from_motion;
-  double sample_s = 0;          // between samples
-  std::vector<Window> windows;  // battery_voltage_v is the mission's mean: no regressor has its noise
+  bool voltages = false;           // of motors without currents were recorded
+  double sample_s = 0;             // between samples
+  std::vector<Window> windows;     // battery_voltage_v is the mission's mean: no regressor has its noise
   std::vector<double> battery_voltage_v;  // measured, of each window
   PowerRows rows;
   double mean_power_w = 1;

@@ -191,12 +191,10 @@ class Builder {
   }
 
   void add_windows() {
-    // Power has rows of its own and is left out here.
-    const FromMotion from_motion{false, d_.from_motion.voltage};
     const std::size_t n = d_.windows.size();
     std::vector<ChannelValues<double>> values(n);
     for (std::size_t k = 0; k < n; ++k) {
-      values[k] = residuals(model_, d_.windows[k], from_motion);
+      values[k] = residuals(model_, d_.windows[k], d_.voltages);
       // The expected reading contains the mean voltage; the response contains the measured one.
       values[k][index_of(Channel::battery_voltage)] +=
           d_.battery_voltage_v[k] - d_.windows[k].battery_voltage_v;
@@ -230,7 +228,7 @@ class Builder {
     }
     for (std::size_t j = 0; j < e_.effects; ++j) {
       for (std::size_t k = 0; k < n; ++k) {
-        const ChannelValues<Dual> r = residuals(models_[j], d_.windows[k], from_motion);
+        const ChannelValues<Dual> r = residuals(models_[j], d_.windows[k], d_.voltages);
         const double times = c_.columns[j].by ? c_.columns[j].by->of(d_.windows[k]) : 1.0;
         for (Made& made : all) {
           for (std::size_t s = 0; s < made.row.size(); ++s) {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <optional>
 
-#include "base/try.h"
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
 #include "gap/verdict/words.h"
@@ -88,11 +87,6 @@ class Explainer {
       predict(p = without_functions(p), false);
     }
     a_.none = summary_.none;
-    a_.models = fit_.models.size();
-    a_.rows = fit_.data.rows.size();
-    a_.blocks = fit_.data.blocks;
-    a_.steps = fit_.steps;
-    a_.log_evidence = fit_.plain.log_joint.maxCoeff() - none_log_joint();
     for (std::size_t f = 0; f < factor_count; ++f) a_.factors[f] = fit_.plain.factor[ix(f)];
     a_.detectable = detectable_share(fit_, view_);
     for (std::size_t c = 0; c < fit_.noise.size(); ++c) {
@@ -137,13 +131,6 @@ class Explainer {
       if (fit_.models[k].configuration) p[ix(k)] = 0;
     }
     return p / std::max(p.sum(), 1e-300);
-  }
-
-  double none_log_joint() const {
-    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
-      if (fit_.models[k].set.empty() && !fit_.models[k].configuration) return fit_.plain.log_joint[ix(k)];
-    }
-    return 0;
   }
 
   // The strength of a hypothesis in a model, by column.
@@ -322,13 +309,15 @@ class Explainer {
     join_same(a_.model);
   }
 
-  void cap_effects() {
+  void cap_effects(double most = withheld) {
     for (ExplainedBy& e : a_.effects)
-      e.probability = std::min(e.probability, withheld), e.group = std::min(e.group, withheld);
+      e.probability = std::min(e.probability, most), e.group = std::min(e.group, most);
   }
 
   void judge() {
     const HeldOut& h = a_.held_out;
+    // Where power is all that shows them, effects are no likelier than that they predict it.
+    if (h.known && fit_.data.at_readings()) cap_effects(chance_of_benefit(h.blocks));
     double moved = 0;
     for (const ExplainedBy& e : a_.effects) moved += e.group >= named ? e.power_share : 0;
     Verdict v = Verdict::inconclusive;
@@ -493,12 +482,6 @@ std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double me
     effects.back().power_w = found.power_share * mean_power_w;
   }
   return effects;
-}
-
-Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
-                                     const robot::RobotModel& robot) {
-  TRY_ASSIGN(const std::unique_ptr<Fit> fit, fit_missions(recordings.missions, robot));
-  return explain(*fit);
 }
 
 }  // namespace joulecast::gap::posterior

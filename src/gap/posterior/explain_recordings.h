@@ -7,7 +7,6 @@
 #include "gap/posterior/hold_out.h"
 #include "gap/posterior/terms.h"
 #include "gap/verdict/diagnosis.h"
-#include "telemetry/recording_set.h"
 
 namespace joulecast::gap::posterior {
 
@@ -39,9 +38,6 @@ struct Explained {
   std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
   Eigen::VectorXd explained_w;  // by row of power, by the model and the causes that follow covariates
   bool adopts = false;          // the model reduces the held-out error
-  std::size_t models = 0, rows = 0, blocks = 0;
-  int steps = 0;
-  double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
 
 // The answer at the point that the walk reached, with the effects that other witnesses name.
@@ -50,9 +46,5 @@ Explained explain(const Fit& fit);
 // Returns the effects that a diagnosis reports: with the verdict effects only named ones, with the verdict
 // none none. `mean_power_w` is of the recordings.
 std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double mean_power_w);
-
-// Explains the gap of one robot's recordings. Fault::invalid where too little of the motion was measured.
-Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
-                                     const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap::posterior

@@ -171,15 +171,24 @@ double power_unit(const Fit& fit, Channel channel) {
   return same == fit.functions.end() ? 0 : same->unit;
 }
 
+double removed_part(std::span<const HeldOut::Block> blocks, std::span<const int> draw) {
+  double before = 0, after = 0;
+  for (std::size_t k = 0; k < draw.size(); ++k)
+    before += draw[k] * blocks[k].file, after += draw[k] * blocks[k].explanation;
+  return 1 - after / before;
+}
+
 }  // namespace
 
+double chance_of_benefit(std::span<const HeldOut::Block> blocks) {
+  const auto draws = statistics::bootstrap_counts(blocks.size());
+  const auto falls = [&](const std::vector<int>& draw) { return removed_part(blocks, draw) > 0; };
+  return static_cast<double>(std::ranges::count_if(draws, falls)) / static_cast<double>(draws.size());
+}
+
 std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks) {
-  return statistics::bootstrap_interval(blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t k = 0; k < draw.size(); ++k)
-      before += draw[k] * blocks[k].file, after += draw[k] * blocks[k].explanation;
-    return 1 - after / before;
-  });
+  return statistics::bootstrap_interval(
+      blocks.size(), [&](std::span<const int> draw) { return removed_part(blocks, draw); });
 }
 
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights) {
@@ -289,17 +298,6 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
 
 Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights) {
   return predictors(fit, weights, {}, false).effects.head(ix(fit.equations.effects));
-}
-
-Without predict_without(const Fit& fit, std::span<const double> weights) {
-  const Predictors p = predictors(fit, weights, {}, true);
-  const Eigen::VectorXd probability =
-      probabilities(*fit.prior, reduce(fit.equations, fit.grams, weights), fit.models).model;
-  Without out{explained_power(fit, p, weights), plain_regression(fit.data, weights), {}};
-  for (const Found& found : summarise(fit, probability).effects) {
-    if (found.group >= named) out.named.push_back(found.id);
-  }
-  return out;
 }
 
 double repeated_part(const Data& d, const Eigen::VectorXd& residual_w) {

@@ -31,21 +31,14 @@ struct HeldOut {
 
 // 95 % interval of the part of the file's error that the explanation removes; NaN of fewer than two blocks.
 std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks);
+// Part of the resamples of the blocks in which the explanation has a smaller error than the file.
+double chance_of_benefit(std::span<const HeldOut::Block> blocks);
 
 // Returns the power of the linear regression by row, fitted to blocks with a weight.
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
 
 // Strengths of the effects with the calibration, averaged over the models without a function.
 Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights);
-
-// Predictions of the posterior without some blocks, for all rows of power.
-struct Without {
-  Eigen::VectorXd explanation_w;   // by effects and calibration
-  Eigen::VectorXd regression_w;    // by the linear regression
-  std::vector<std::string> named;  // ids
-};
-// `weights` of each block; 0: left out.
-Without predict_without(const Fit& fit, std::span<const double> weights);
 
 // `with_functions` false: given that no function is present.
 HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,

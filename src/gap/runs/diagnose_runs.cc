@@ -12,47 +12,17 @@
 #include "gap/runs/run_checks.h"
 #include "gap/verdict/answer.h"
 #include "gap/verdict/words.h"
-#include "statistics/bootstrap.h"
 #include "statistics/regression.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t max_held_out_levels = 8;  // of a condition to be left out one by one
-
 // Progress of the stages, as parts of the whole.
 constexpr double after_search = 0.6;
-constexpr double least_visible_share = 0.002;  // of a run's energy within the bounds of an effect
 
 double mean_absolute_normal(double sd) {
   return std::sqrt(2 / std::numbers::pi) * sd;
-}
-
-// The conditions by which runs can be left out: their levels, as sets of runs.
-std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& set) {
-  std::vector<std::pair<std::string, std::vector<bool>>> levels;
-  const auto add = [&](auto&& name_of_run) {
-    std::map<std::string, std::vector<bool>> sets;
-    for (std::size_t k = 0; k < set.runs.size(); ++k) {
-      const std::string name = name_of_run(set.runs[k]);
-      if (name.empty()) return;
-      auto& own = sets[name];
-      own.resize(set.runs.size(), false);
-      own[k] = true;
-    }
-    if (sets.size() >= 2 && sets.size() <= max_held_out_levels)
-      levels.insert(levels.end(), sets.begin(), sets.end());
-  };
-  add([](const MissionRun& r) { return r.table.empty() ? "" : "table " + r.table; });
-  for (std::size_t l = 0; l < set.labels.size(); ++l)
-    add([&](const MissionRun& r) { return r.labels[l].empty() ? "" : set.labels[l] + " " + r.labels[l]; });
-  add([](const MissionRun& r) { return fmt::format("payload_kg {:g}", r.at.payload_kg); });
-  add([](const MissionRun& r) { return fmt::format("speed_m_s {:g}", r.at.speed_m_s); });
-  add([](const MissionRun& r) {
-    return std::string(r.at.turn_rad == 0 ? "straight" : r.at.turn_rad > 0 ? "turn left" : "turn right");
-  });
-  return levels;
 }
 
 class RunDiagnoser {
@@ -78,8 +48,6 @@ class RunDiagnoser {
     answer_ = posterior::explain(*fit_);
     report(after_search);
     judge_runs();
-    hold_out_conditions();
-    find_invisible();
     add_limits();
     return std::move(r_);
   }
@@ -98,8 +66,6 @@ class RunDiagnoser {
   void report(double part) const {
     if (progress_) progress_(part);
   }
-
-  std::size_t block_of(std::size_t run) const { return run * rows_.data().blocks / set_.runs.size(); }
 
   // Compares the model as it is with the measured energies.
   void measure() {
@@ -143,12 +109,7 @@ class RunDiagnoser {
         {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
     state_effects(answer_, power_w, d);
     for (const std::string& reason : answer_.reasons) d.reasons.push_back(sentence(reason));
-    const auto moved_w = [&](const dynamics::ActiveEffect& effect) {
-      std::vector<dynamics::ActiveEffect> with = fit_->data.in_file;
-      with.push_back(effect);
-      return (posterior::predicted_power(fit_->data, with) - fit_->unchanged_w).cwiseAbs().mean();
-    };
-    state_offer(*fit_, answer_, moved_w, false, d);
+    state_offer(*fit_, answer_, false, d);
     state_held_out(answer_.held_out, d);
     if (d.baseline) add_terms(*d.baseline);
   }
@@ -164,52 +125,6 @@ class RunDiagnoser {
       if (terms.x.col(at).isZero(0)) continue;
       b.terms.push_back(
           {terms.names[k], terms.units[k], data.coefficients[at], data.sd[at], model.coefficients[at]});
-    }
-  }
-
-  void hold_out_conditions() {
-    for (const auto& [what, out] : levels_of(set_)) {
-      std::vector<double> weights(rows_.data().blocks, 1.0);
-      for (std::size_t k = 0; k < out.size(); ++k) {
-        if (out[k]) weights[block_of(k)] = 0;
-      }
-      if (std::ranges::count(weights, 1.0) < 2) continue;
-      posterior::Without without = posterior::predict_without(*fit_, weights);
-      const std::vector<double> explained = rows_.energies_j(without.explanation_w),
-                                regression = rows_.energies_j(without.regression_w);
-      LeftOut l;
-      l.what = what;
-      l.effects = std::move(without.named);
-      std::vector<double> before, after;
-      for (std::size_t k = 0; k < out.size(); ++k) {
-        if (!out[k]) continue;
-        before.push_back(rows_.missed(k, r_.runs[k].model_j));
-        after.push_back(rows_.missed(k, explained[k]));
-        l.before += before.back();
-        l.after += after.back();
-        l.referee += rows_.missed(k, regression[k]);
-      }
-      l.runs = before.size();
-      const auto n = static_cast<double>(l.runs);
-      l.before /= n, l.after /= n, l.referee /= n;
-      l.interval = statistics::bootstrap_interval(l.runs, [&](std::span<const int> draw) {
-        double b = 0, a = 0;
-        for (std::size_t k = 0; k < draw.size(); ++k) b += draw[k] * before[k], a += draw[k] * after[k];
-        return 1 - a / b;
-      });
-      r_.conditions.push_back(std::move(l));
-    }
-  }
-
-  void find_invisible() {
-    for (const dynamics::Effect* effect : dynamics::catalogue()) {
-      const auto& all = fit_->catalogue.hypotheses;
-      const bool visible = std::ranges::any_of(all, [&](const Hypothesis& h) {
-        const double bound = std::max(std::fabs(h.least), std::fabs(h.most));
-        return h.is_effect() && h.effect.effect == effect &&
-               fit_->equations.share[posterior::ix(h.columns.front())] * bound > least_visible_share;
-      });
-      if (!visible) r_.not_visible.emplace_back(effect->info().id);
     }
   }
 

@@ -10,15 +10,6 @@
 
 namespace joulecast::gap {
 
-// Runs of one condition, predicted by a diagnosis made without any of them.
-struct LeftOut {
-  std::string what;  // "payload_kg 8.25", "surface carpet"
-  std::size_t runs = 0;
-  double before = 0, after = 0, referee = 0;  // mean absolute error, relative to the measured energy
-  std::array<double, 2> interval{};           // of the fall 1 - after/before, 95 %, bootstrap over runs
-  std::vector<std::string> effects;           // named without them
-};
-
 // One run: its measured energy, and the model's, as it is and with the effects found.
 struct JudgedRun {
   MissionRun run;
@@ -35,9 +26,7 @@ struct RunDiagnosis {
   double model_ratio = 1;    // of the given energies to those of the robot file under the conditions
   double scatter = 0,
          side_scatter = 0;          // from run to run, sd relative to a run's energy; of right minus left
-  std::vector<LeftOut> conditions;  // condition by condition, label by label, and table by table
   std::vector<std::string> limits;  // limits of these energies, in sentences
-  std::vector<std::string> not_visible;  // effects without influence on these energies
   std::vector<JudgedRun> runs;
 };
 

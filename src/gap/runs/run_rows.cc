@@ -85,7 +85,7 @@ RunRows::RunRows(const RunSet& set, const robot::RobotModel& robot,
   d.covariates = set.covariates;
   d.missions = runs_.size();
   d.blocks = std::min(runs_.size(), most_run_blocks);
-  d.power = d.from_motion.power = true;
+  d.power = true;
   d.fewest = fewest_runs_of_channel;
   fill_covariates(runs_, d.covariates.size());
   labels_as_covariates(set, runs_, d.covariates);

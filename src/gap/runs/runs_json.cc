@@ -10,22 +10,6 @@ namespace {
 
 using described::Table;
 
-const Table<LeftOut>& condition_table() {
-  using L = LeftOut;
-  static const auto table =
-      Table<L>()
-          .value("left_out", &L::what, "the condition, by name and value")
-          .value("runs", &L::runs, "number of runs under it")
-          .number_or_null("held_out_before", &L::before, "their mean |error| over measured energy")
-          .number_or_null("held_out_after", &L::after, "the same with the effects found without them")
-          .number_or_null("baseline_held_out", &L::referee, "the same of a linear regression without them")
-          .number_or_null(
-              "fraction", [](const L& l) { return 1 - l.after / l.before; }, "1 - after / before")
-          .numbers("ci", &L::interval, "of the fraction, 95 %")
-          .texts("effects", &L::effects, "the effects found without them");
-  return table;
-}
-
 const Table<JudgedRun>& run_table() {
   using J = JudgedRun;
   static const auto table =
@@ -57,10 +41,7 @@ const Table<RunDiagnosis>& runs_table() {
               "kind", [](const R&) { return "mission_energies"; }, "distinguishes it from other diagnoses")
           .object("model", std::identity(), "the model that was diagnosed", model)
           .object("scatter", std::identity(), "differences between runs that no effect explains", scatter)
-          .list("left_out_conditions", &R::conditions, "predictions of the runs of a condition by the others",
-                condition_table())
           .texts("limits", &R::limits, "limits of these energies, in sentences")
-          .texts("not_visible", &R::not_visible, "effects without influence on these energies")
           .list("runs", &R::runs, "the runs, one by one", run_table());
   return table;
 }

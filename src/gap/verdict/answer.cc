@@ -46,6 +46,14 @@ std::string refusal_of(const Explained& answer, bool other_channels, const Diagn
   return {};
 }
 
+// Mean |change of power| by one effect [W]; 0 without power.
+double moved_w(const posterior::Fit& fit, const dynamics::ActiveEffect& effect) {
+  if (!fit.data.power) return 0;
+  std::vector<dynamics::ActiveEffect> with = fit.data.in_file;
+  with.push_back(effect);
+  return (posterior::predicted_power(fit.data, with) - fit.unchanged_w).cwiseAbs().mean();
+}
+
 }  // namespace
 
 void state_effects(const Explained& answer, double mean_power_w, Diagnosis& d) {
@@ -93,8 +101,13 @@ void weigh_by_checks(Diagnosis& d) {
   d.refusal = error_words(sound);
 }
 
-void state_offer(const posterior::Fit& fit, const Explained& answer, const MovedPower& moved_w,
-                 bool other_channels, Diagnosis& d) {
+PowerSource power_source(const posterior::Data& data) {
+  const auto read = [](const Window& w) { return std::isfinite(w.battery_power_w); };
+  if (!data.power) return PowerSource::none;
+  return std::ranges::any_of(data.windows, read) ? PowerSource::battery : PowerSource::motors;
+}
+
+void state_offer(const posterior::Fit& fit, const Explained& answer, bool other_channels, Diagnosis& d) {
   struct Offered {
     robot::AdoptedEffect effect;
     double moved_w = 0, deviation = missing;
@@ -102,7 +115,7 @@ void state_offer(const posterior::Fit& fit, const Explained& answer, const Moved
   std::vector<Offered> offered;
   for (const dynamics::ActiveEffect& effect : answer.model) {
     if (d.verdict == Verdict::none) break;
-    Offered one{dynamics::adopt(effect), moved_w(effect)};
+    Offered one{dynamics::adopt(effect), moved_w(fit, effect)};
     const auto own = std::ranges::find(d.effects, one.effect.id, &DiagnosedEffect::id);
     if (own != d.effects.end()) one.deviation = own->parameters.front().deviation;
     const bool named = own != d.effects.end() && own->group >= posterior::named;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <functional>
-
 #include "gap/posterior/explain_recordings.h"
 #include "gap/verdict/diagnosis.h"
 
@@ -18,12 +16,12 @@ void state_held_out(const posterior::HeldOut& held_out, Diagnosis& diagnosis);
 // Multiplies probabilities by sound_readings(). Below one half the verdict is inconclusive.
 void weigh_by_checks(Diagnosis& diagnosis);
 
-// Mean |change of power| by one effect [W]; 0 without power.
-using MovedPower = std::function<double(const dynamics::ActiveEffect&)>;
+// Origin of the power of these recordings.
+PowerSource power_source(const posterior::Data& data);
 
 // Sets the effects that a robot file may take, one shape of each, and the reason against adopting them.
 // `other_channels`: the fit has other channels than power.
-void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, const MovedPower& moved_w,
-                 bool other_channels, Diagnosis& diagnosis);
+void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, bool other_channels,
+                 Diagnosis& diagnosis);
 
 }  // namespace joulecast::gap

@@ -1,6 +1,7 @@
 #include "gap/verdict/diagnosis_json.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
 
@@ -28,6 +29,10 @@ const Table<DiagnosedParameter>& value_table() {
   return table;
 }
 
+double probability_of(const Check& check) {
+  return std::isfinite(check.probability) ? check.probability : check.error;
+}
+
 const Table<Check>& check_table() {
   static const auto table =
       Table<Check>()
@@ -42,10 +47,10 @@ const Table<Check>& check_table() {
           .value("contradicted", &Check::contradicted, "the channel is not used in the diagnosis")
           .known("factor", &Check::factor,
                  "by which the channel is divided for the diagnosis: -1 for a reversed sign")
-          .value("probability", &Check::probability,
+          .value("probability", probability_of,
                  "of a wrong sign, unit or side, against every other explanation; of a channel that is used "
                  "as it is, of any error of the readings")
-          .only([](const Check& check) { return check.probability > 0; })
+          .only([](const Check& check) { return std::isfinite(probability_of(check)); })
           .known("first_mission", &Check::first_mission,
                  "of a step between missions: index of the first one after it")
           .integers("few_missions", &Check::few_missions,

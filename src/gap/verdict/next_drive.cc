@@ -132,7 +132,7 @@ statistics::Information expected_information(const posterior::Fit& fit, const st
   drive.missions = drive.blocks = 1;
   drive.motors = fit.data.motors;
   drive.power = fit.data.power;
-  drive.from_motion = fit.data.from_motion;
+  drive.voltages = fit.data.voltages;
   drive.sample_s = fit.data.sample_s;
   drive.mean_power_w = fit.data.mean_power_w;
   drive.windows = windows;

@@ -172,9 +172,10 @@ class Reasons {
 
 double sound_readings(std::span<const Check> checks) {
   double sound = 1;
-  for (const Check& check : checks)
-    if (!check.contradicted && check.probability > 0)
-      sound *= check.factor || check.swapped ? check.probability : 1 - check.probability;
+  for (const Check& check : checks) {
+    const double own = check.factor || check.swapped ? check.probability : 1 - check.error;
+    if (!check.contradicted && std::isfinite(own)) sound *= own;
+  }
   return sound;
 }
 

@@ -41,7 +41,7 @@ std::vector<Part> parts_of(std::span<const Window> windows, const robot::RobotMo
   for (std::size_t k = 0; k < n; ++k) {
     const Window& w = windows[k];
     parts[0].residual_w[k] = measured_w[k] - modelled_w[k];
-    const ChannelValues<double> r = residuals(model, w, {});
+    const ChannelValues<double> r = residuals(model, w, false);
     const double electrical = r[0] * w.current_a[0] + r[1] * w.current_a[1];
     const double at_bus = r[index_of(Channel::bus)];
     if (!std::isfinite(parts[0].residual_w[k] + electrical + at_bus)) continue;

@@ -4,7 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "gap/equations/power.h"
+#include "gap/equations/cause.h"
+#include "gap/equations/channels.h"
 #include "gap/verdict/diagnosis.h"
 #include "tests/plausibility/made_recordings.h"
 
@@ -12,21 +13,18 @@ namespace joulecast::gap::made {
 
 using namespace joulecast::made;
 
-// A robot's drives with the battery power of the model with planted causes. Motors are not measured.
+// A robot's drives with the battery power of the model. Motors are not measured.
 class Drives {
  public:
-  explicit Drives(std::vector<Cause> causes) : truth(std::move(causes)) {
+  Drives() {
     const auto readings = windows::find_readings(robot_.recordings.missions);
     windows_ = windows::make_windows(robot_.recordings.missions, robot_.model, readings);
-    power_w = modelled_power(robot_.model, {}, truth, windows_);
-    for (std::size_t k = 0; k < windows_.size(); ++k) windows_[k].battery_power_w = power_w[k];
+    const dynamics::DriveModel model(robot_.model, {});
+    for (Window& w : windows_) w.battery_power_w = metered_powers(model, w).battery_w;
   }
 
   const robot::RobotModel& robot() const { return robot_.model; }
   const std::vector<Window>& windows() const { return windows_; }
-
-  std::vector<Cause> truth;
-  std::vector<double> power_w;
 
  private:
   Robot robot_ = joulecast::made::virtual_robot(

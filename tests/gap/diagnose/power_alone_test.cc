@@ -7,34 +7,9 @@
 namespace joulecast::gap {
 namespace {
 
-TEST(PowerAlone, SelectsResidualsByReadings) {
-  windows::Readings read;
-  EXPECT_TRUE(from_motion_of(read).kinematics);  // without electrical readings
-  read.battery_power = true;
-  EXPECT_FALSE(from_motion_of(read).kinematics);
-  read.motor_voltages = true;
-  EXPECT_TRUE(from_motion_of(read).kinematics && from_motion_of(read).voltage);
-  read.motor_currents = true;
-  EXPECT_TRUE(from_motion_of(read).kinematics);
-  EXPECT_FALSE(from_motion_of(read).power || from_motion_of(read).voltage);
-}
-
-TEST(PowerAlone, ComparesStartsAndStops) {
-  const made::Drives drives({});
-  const dynamics::DriveModel model(drives.robot(), {});
-  std::size_t between = 0;
-  for (const Window& w : drives.windows()) {
-    const auto r = residuals(model, w, FromMotion{.power = true, .voltage = false});
-    // The drives have the model's power.
-    EXPECT_NEAR(r[index_of(Channel::power)], 0, 1e-9);
-    between += w.moving[0] || w.resting[0] ? 0 : 1;
-  }
-  EXPECT_GT(between, 10u);
-}
-
 // A bias of 1 A acts at the mission's mean voltage, independent of the noise of single readings.
 TEST(PowerAlone, AppliesBiasAtMissionVoltage) {
-  const made::Drives drives({});
+  const made::Drives drives;
   const std::array effects{made::cause("current_sensor_bias", 0).effect};
   const dynamics::BasicDriveModel<dynamics::Dual> model(drives.robot(), effects, 0, 0);
   Window w = drives.windows().front();

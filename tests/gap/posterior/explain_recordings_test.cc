@@ -168,6 +168,15 @@ TEST(RemovedInterval, ContainsZeroForScatter) {
   EXPECT_TRUE(std::isnan(removed_interval(std::span(steady).first(1))[0]));
 }
 
+// Of four resamples of two blocks, one has only the block that the explanation predicts worse.
+TEST(ChanceOfBenefit, IsPartOfResamples) {
+  using Block = HeldOut::Block;
+  const std::vector<Block> two{{.file = 2, .explanation = 1, .size = 10},
+                               {.file = 1, .explanation = 1.5, .size = 10}};
+  EXPECT_NEAR(chance_of_benefit(two), 0.75, 0.07);
+  EXPECT_EQ(chance_of_benefit(std::span(two).first(1)), 1);
+}
+
 TEST(Constancy, RejectsSwitchedLoad) {
   Drives steady(4), switching(4);
   steady.load_w = [](double) { return 6.0; };

@@ -52,6 +52,67 @@ TEST(MakeFunctions, OneMissionHasNoTime) {
   EXPECT_EQ(of_time(), 0);
 }
 
+// A logger of a reading in 5 s, with the height: the climb is a cause, beside a friction that is too small in
+// the file.
+TEST(SlowRows, NameClimbAndFriction) {
+  Drives drives(31);
+  constexpr double step_s = 5, row_s = 0.05;
+  const dynamics::DriveModel model(drives.robot, std::vector{effect_of("coulomb_friction", 1)});
+  const double weight_n = drives.robot.total_mass_kg(0) * robot::standard_gravity_m_s2;
+  std::mt19937_64 random(31);
+  std::normal_distribution<double> noise(0, 1);
+  telemetry::RecordingSet recordings = drives.recordings();
+  for (std::size_t m = 0; m < recordings.missions.size(); ++m) {
+    telemetry::Recording& mission = recordings.missions[m];
+    mission.samples.clear();
+    signals::CovariateSeries height{"height_m", {}, {}};
+    double way_m = 0, height_m = 10;
+    for (int k = 0; k < 72'000; ++k) {
+      const double t = row_s * k, phase = 0.7 * static_cast<double>(m);
+      const auto speed = [&](double at) { return 4 + 2 * std::sin(at / 37 + phase) + std::sin(at / 15.5); };
+      const double climb_rad = 0.04 * std::sin(way_m / 20 + phase), v = 0.1 * speed(t);
+      Window w;
+      w.speed_rad_s = {speed(t), speed(t)};
+      const double a = (speed(t + 0.01) - speed(t - 0.01)) / 0.02;
+      w.acceleration_rad_s2 = {a, a};
+      w.battery_voltage_v = 24;
+      const double up_w = weight_n * v * std::sin(climb_rad);
+      way_m += v * row_s;
+      height_m += v * row_s * std::sin(climb_rad);
+      if (k % static_cast<int>(step_s / row_s) != 50) continue;
+      signals::Sample s;
+      s.utime_us = 1'700'000'000'000'000 + std::llround(1e6 * (t + 10'000.0 * static_cast<double>(m)));
+      s.sequence = static_cast<std::int64_t>(mission.samples.size());
+      s.wheel_velocity_rad_s = w.speed_rad_s;
+      s.battery_voltage_v = 24;
+      s.battery_current_a = (metered_powers(model, w).battery_w + up_w + noise(random)) / 24;
+      mission.samples.push_back(s);
+      height.utime_us.push_back(s.utime_us);
+      height.value.push_back(height_m);
+    }
+    mission.covariates = {height};
+  }
+  const auto set = telemetry::make_recording_set(drives.robot.robot_id, std::move(recordings.missions));
+  ASSERT_TRUE(set);
+  const auto a = explain_recordings(*set, drives.robot);
+  ASSERT_TRUE(a);
+  EXPECT_TRUE(names(*a, "grade")) << name_of(a->verdict);
+  EXPECT_TRUE(names(*a, "coulomb_friction")) << name_of(a->verdict);
+}
+
+// A file with twice the friction of the robot: the estimate is half of the file's.
+TEST(DetectionLimit, SeesTooMuchFriction) {
+  Drives drives(32);
+  const telemetry::RecordingSet recordings = drives.recordings();
+  for (double& t : drives.robot.motor.friction_torque_nm) t *= 2;
+  const auto a = explain_recordings(recordings, drives.robot);
+  ASSERT_TRUE(a);
+  const auto friction = std::ranges::find(a->effects, "coulomb_friction", &ExplainedBy::id);
+  ASSERT_NE(friction, a->effects.end());
+  EXPECT_GT(friction->group, 0.9);
+  EXPECT_NEAR(friction->parameters.front().value, -0.5, 3 * friction->parameters.front().deviation);
+}
+
 // The limit is that of the effects that are hard to see, 3.5 deviations of the estimate: twice as much is
 // named.
 TEST(DetectionLimit, IsNearTheDeviation) {
@@ -189,8 +250,7 @@ Diagnosis offered(const Offer& offer) {
   d.noise_floor = 0.01;
   state_effects(a, 100, d);
   state_held_out(a.held_out, d);
-  state_offer(
-      fit, a, [](const auto&) { return 22.0; }, false, d);
+  state_offer(fit, a, false, d);
   return d;
 }
 

@@ -9,6 +9,7 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "gap/posterior/data.h"
+#include "gap/posterior/explain_recordings.h"
 #include "robot/robot_file.h"
 #include "telemetry/recording_set.h"
 
@@ -70,3 +71,14 @@ struct Drives {
 };
 
 }  // namespace joulecast::gap::posterior::made
+
+namespace joulecast::gap::posterior {
+
+inline Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
+                                            const robot::RobotModel& robot) {
+  const auto fit = fit_missions(recordings.missions, robot);
+  if (!fit) return tl::unexpected(fit.error());
+  return explain(**fit);
+}
+
+}  // namespace joulecast::gap::posterior

@@ -134,7 +134,7 @@ TEST(Offer, WeighsCausesByChecks) {
   Diagnosis d = made_diagnosis();
   const double before = d.effects[0].probability, group = d.effects[0].group;
   d.checks.push_back({"wheel_velocity_scale", "wheel_velocity", 2, {1.9, 2.1}, "It may be twice.", false});
-  d.checks.back().probability = 0.3;
+  d.checks.back().error = 0.3;
   d.checks.push_back({"battery_current_scale", "battery_current", 10, {9, 11}, "It is ten times.", false});
   d.checks.back().probability = 0.9;
   d.checks.back().factor = 10;
@@ -152,7 +152,7 @@ TEST(Offer, WeighsCausesByChecks) {
 TEST(Offer, RefusesCausesOfLikelyError) {
   Diagnosis d = made_diagnosis();
   d.checks.push_back({"wheel_velocity_scale", "wheel_velocity", 2, {1.9, 2.1}, "It may be twice.", false});
-  d.checks.back().probability = 0.6;
+  d.checks.back().error = 0.6;
   weigh_by_checks(d);
   EXPECT_EQ(d.verdict, Verdict::inconclusive);
   EXPECT_THAT(reasons_for(d, false).front(), HasSubstr("60\u00a0%"));

@@ -65,33 +65,14 @@ const runColumns = [
   figure('model', 'Error of the model', off('model_j')),
   figure('held', 'With the effects, run held out', off('held_out_j')),
 ];
-const conditionColumns = [
-  column('left', 'Held out', (c) => c.left_out, { head: true }),
-  figure('runs', 'Runs', (c) => c.runs),
-  figure('before', 'Robot file', (c) => share(c.held_out_before)),
-  figure('after', 'With the effects', (c) => share(c.held_out_after)),
-  figure('baseline', 'Regression', (c) => share(c.baseline_held_out)),
-  column('named', 'Effects', (c) => c.effects.map(effectName).join(', ') || '–', { class: 'words' }),
-];
 
 export function Runs({ of: r }) {
   return (
-    <>
-      <TablePanel
-        title="Runs"
-        columns={runColumns}
-        rows={r.runs}
-        note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
-      />
-      {r.left_out_conditions.length > 0 && (
-        <TablePanel
-          title="Conditions held out"
-          columns={conditionColumns}
-          rows={r.left_out_conditions}
-          keyOf={(c) => c.left_out}
-          note="Mean error of the runs of a condition, predicted by a diagnosis and a linear regression of the other runs."
-        />
-      )}
-    </>
+    <TablePanel
+      title="Runs"
+      columns={runColumns}
+      rows={r.runs}
+      note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
+    />
   );
 }

@@ -1,4 +1,4 @@
-#include "answers/json/mission_json.h"
+#include "answers/mission.h"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "server/http/json_digits.h"
+#include "server/http/text.h"
 
 #include <algorithm>
 

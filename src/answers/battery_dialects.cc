@@ -1,4 +1,4 @@
-#include "answers/json/battery_dialects.h"
+#include "answers/battery_dialects.h"
 
 #include <algorithm>
 #include <cmath>
