@@ -71,13 +71,13 @@ struct Knot {
   Pose pose;
 };
 
-// A segment driven without a stop: from rest to rest except at the ends of the whole path. Its coordinate is
-// the way of the axle's middle [m], or the angle turned [rad, > 0] when the robot turns in place.
-// Of a run.
+// Anywhere on a run: what its knots give there, and how the curvature changes along the way.
 struct Place : Knot {
   double curvature_slope = 0;  // 1/m^2
 };
 
+// A segment driven without a stop: from rest to rest except at the ends of the whole path. Its coordinate is
+// the way of the axle's middle [m], or the angle turned [rad, > 0] when the robot turns in place.
 struct Run {
   int turn = 0;  // +1 or -1: turning in place to the left or right; 0: driving
   // At least 2, ascending; curvature and position are linear in between, the heading turns with the
