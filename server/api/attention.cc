@@ -404,7 +404,7 @@ std::vector<AttentionReason> AttentionList::remembered(const std::string& robot_
 
 // A reason that is not found stays until it is known to have ended.
 bool AttentionList::has_ended(const std::string& robot_id, const AttentionReason& reason) const {
-  if (robot_id.empty() || reason.kind == "contradicted") return true;
+  if (robot_id.empty() || reason.kind == "contradicted" || reason.kind == "no_robot_file") return true;
   if (reason.kind == "drift" || reason.kind == "stands_out")
     return services_.watch.findings().contains(robot_id);
   if (reason.kind == "gap_diagnosed" || reason.kind == "proposal") return read_at_.has_value();

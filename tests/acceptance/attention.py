@@ -69,11 +69,12 @@ def main():
         fleet.drive("slow")
         fleet.drive("empty")
         lost = fleet.drive("lost")
-        fleet.drive("stranger")
+        stranger = fleet.drive("stranger")
         lossy = fleet.drive("lossy", "--loss", "0.5")
 
         check("Check the robot's network" in wait_for("lossy", "contradicted")["action"], "what to do about lost samples")
         lossy.kill()
+        lossy.wait()
         check(ask(programs.url, "DELETE", "/v1/robots/lossy?history=purge", None)[0] == 200, "a robot is removed")
         check("reserve of 95 %" in wait_for("empty", "charge_low")["message"], "the reserve in the message")
         check("robot file" in wait_for("stranger", "no_robot_file")["message"], "no robot file")
@@ -120,6 +121,8 @@ def main():
         check(listed()["lost"]["silent"]["acknowledged"] is not None, "an acknowledgement survives a restart")
         check(listed()["lost"]["silent"]["since_utime_us"] == silent["since_utime_us"], "the beginning survives a restart")
 
+        stranger.kill()
+        wait_until(lambda: "stranger" not in listed(), 30, "a robot without a file leaves the list when it is silent")
         lost = fleet.drive("lost")
         wait_until(lambda: "silent" not in listed().get("lost", {}), 30, "a robot with telemetry again leaves the list")
         wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "another mission")
