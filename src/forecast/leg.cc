@@ -98,11 +98,8 @@ void LegTracker::add(const LegSample& sample) {
   piece.square_rad2_s = yaw * yaw * h;
   piece.payload_kg = std::isfinite(sample.payload_kg) ? sample.payload_kg : 0;
   piece.battery_j = 0.5 * (before->power_w + sample.power_w) * h;
-  // It is to drive, on a curve too, or to turn.
-  if (std::fabs(command[0]) < 0.5 * half_track_m_ * std::fabs(command[1]))
-    command[0] = 0;
-  else if (std::fabs(command[0]) > 0)
-    command[1] = 0;
+  // It is to turn or to drive, on a curve too; unknown ones remain so.
+  command[std::fabs(command[0]) < 0.5 * half_track_m_ * std::fabs(command[1]) ? 0 : 1] *= 0;
   for (std::size_t k = 0; k < piece.commanded.size(); ++k) {
     const double size = std::fabs(command[k]);
     piece.commanded[k] = {size * h, size > 0 ? h : 0, size};
