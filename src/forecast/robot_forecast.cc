@@ -126,7 +126,7 @@ void Forecaster::extend(PlanSum& sum, const PricedLeg& leg, double copies) const
 // legs is common to both ways of driving too.
 Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subjects, double halt_unit) const {
   Prediction p;
-  double variance = 0, common = 0;
+  double estimate = 0, variance = 0, common = 0;
   for (const Subject subject : subjects) {
     const auto s = static_cast<std::size_t>(subject);
     const Track& t = tracks[s];
@@ -137,16 +137,19 @@ Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subje
     }
     if (!(part > 0)) continue;
     p.legs += part;
-    variance += t.correction.variance_j2(sum.features[s]);
+    estimate += t.correction.variance_j2(sum.features[s]);
     // Scores of missions without payload do not narrow the uncertainty that payload adds.
     const double narrowed = std::min(1.0, t.inflation * t.scores.deviation());
-    variance += (1 / (narrowed * narrowed) - 1) * t.correction.covariance[payload_feature][payload_feature] *
+    estimate += (1 / (narrowed * narrowed) - 1) * t.correction.covariance[payload_feature][payload_feature] *
                 sum.features[s][payload_feature] * sum.features[s][payload_feature];
     for (std::size_t k = 0; k < motion_count; ++k)
       variance += t.scatter[k] * t.scatter[k] * sum.squares[s][k];
     common += t.common * part;
   }
-  if (p.legs > 0) p.spread = std::sqrt(variance + common * common) / p.legs;
+  if (p.legs > 0) {
+    p.scatter = std::sqrt(variance + common * common) / p.legs;
+    p.spread = std::hypot(p.scatter, std::sqrt(estimate) / p.legs);
+  }
   p.halts = habit.standing(sum.stops, halt_unit);
   return p;
 }
