@@ -53,7 +53,8 @@ TEST(Prediction, UncertaintyKeepsTheMean) {
   for (const double deviation : {0.0, 0.1, 0.3, 0.5}) {
     Forecaster f = forecaster(0.01, 0.02);
     for (Forecaster::Track& track : f.tracks)
-      for (std::size_t k = 0; k < feature_count; ++k) track.correction.covariance[k][k] = deviation * deviation;
+      for (std::size_t k = 0; k < feature_count; ++k)
+        track.correction.covariance[k][k] = deviation * deviation;
     PlanSum sum;
     for (int k = 0; k < 4; ++k) f.extend(sum, drive(500));
     const Prediction p = f.energy(sum);
