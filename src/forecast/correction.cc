@@ -62,12 +62,11 @@ Correction untried(Subject subject) {
   const Features& deviation = is_duration(subject) ? durations : energies;
   if (is_duration(subject)) prior.mean[0] = 0;
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
-  const double correlation = is_duration(subject) ? 0 : 0.7;
   const auto correlate = [&](std::size_t a, std::size_t b, double by) {
     prior.covariance[a][b] = prior.covariance[b][a] = by * deviation[a] * deviation[b];
   };
-  correlate(1, 2, correlation), correlate(1, payload_feature, correlation);
-  correlate(2, payload_feature, correlation * correlation);
+  if (!is_duration(subject))
+    correlate(1, 2, 0.8), correlate(1, payload_feature, 0.5), correlate(2, payload_feature, 0.5);
   return prior;
 }
 

@@ -60,9 +60,9 @@ struct Correction {
 // deviations are these, with equal weights of both, times sqrt(3/5), as a t distribution of 5 degrees of
 // freedom exceeds its scale; not so payload's, as first payloads are forecast without evidence (times
 // sqrt(3/5), their intervals cover 90 and 82 %). Correlations of driving and turning are 0.87 and 0.76, of
-// driving and payload 0.76 and 0.31, of turning and payload 0.70 and 0.26: 0.7, its square for the last. Of
-// stated durations, of the 100 that follow plans inexactly: driving 0.072, turning 0.056, speed 0.052,
-// likewise, payload at most 0.01; a motion outlasts its command by 0.05 to 0.12 s.
+// driving and payload 0.76 and 0.31, of turning and payload 0.70 and 0.26: their means. Of stated durations,
+// of the 100 that follow plans inexactly: driving 0.072, turning 0.056, speed 0.052, likewise, payload at
+// most 0.01; a motion outlasts its command by 0.05 to 0.12 s.
 Correction untried(Subject subject);
 
 // Each factor's prior is a t distribution of 5 degrees of freedom, which far evidence overrules: a normal one
