@@ -47,7 +47,7 @@ TEST(Prediction, OnlyOwnScatterAveragesOut) {
   }
 }
 
-// The less is known of a robot, the wider are the intervals of its energy; it is expected to be the model's.
+// Fewer missions of a robot widen the intervals of its energy; the expected one is the model's.
 TEST(Prediction, UncertaintyKeepsTheMean) {
   double width = 0;
   for (const double deviation : {0.0, 0.1, 0.3, 0.5}) {
