@@ -177,8 +177,7 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
     }
     TaskPlan::Task& into = plan.tasks.emplace_back();
     into.legs = std::move(*legs);
-    plan.halts_stated =
-        plan.halts_stated || task.dwell_s || task.way.halts_stated() || forecast::states_halts(into.legs);
+    plan.halts_stated = plan.halts_stated || task.dwell_s || task.way.halts_stated;
     for (const PlannedLeg& leg : into.legs)
       into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
     into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);

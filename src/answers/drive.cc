@@ -113,7 +113,10 @@ const described::Variants<planning::Segment, PathContext>& segments() {
                   .numbers("curvature_1_m", &SampledCurvature::curvature_1_m, {2, max_points}, curvature,
                            "curvature there, positive to the left; linear between points"))
           .of("dwell", "rest",
-              Part<Dwell>().number("duration_s", &Dwell::duration_s, dwell_bounds_s, "duration"))
+              Part<Dwell>().number(
+                  "duration_s", &Dwell::duration_s, dwell_bounds_s,
+                  "duration. Of usual driving: if a dwell is stated, 0 included, the forecast "
+                  "contains no other halts"))
           .of("payload", "change of payload",
               Part<PayloadChange>().number("payload_kg", &PayloadChange::payload_kg, not_negative,
                                            "payload from here on; at most the robot's limit", {},
@@ -170,6 +173,7 @@ void read_legs(Fields& fields, Way& way, PathContext& context) {
 // There without payload, from there to the drop-off with it.
 void read_stations(Fields& fields, Way& way, PathContext& context) {
   const planning::Stations& at = *way.stations;
+  way.halts_stated = at.halts_stated();
   if (!at.pickup) fields.required("pickup");
   if (!at.dropoff) fields.required("dropoff");
   const Bounds allowed{.minimum = 0, .maximum = context.payload_limit_kg};
@@ -260,8 +264,15 @@ const Input<Way, PathContext>& route_input() {
     return described::of_array(described::of_bounds(bounds),
                                described::of_count({0, segments_of_path.maximum}));
   };
-  static const auto path = WayInput().list("path", &Way::path, segments_of_path, "the way to drive",
-                                           segments(), Presence::required, "path");
+  static const auto path = WayInput()
+                               .list("path", &Way::path, segments_of_path, "the way to drive", segments(),
+                                     Presence::required, "path")
+                               .check([](Fields&, Way& way, PathContext&) {
+                                 way.halts_stated =
+                                     std::ranges::any_of(way.path, [](const planning::Segment& part) {
+                                       return std::holds_alternative<planning::Dwell>(part);
+                                     });
+                               });
   static const auto legs =
       WayInput()
           .custom(

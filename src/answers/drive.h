@@ -26,10 +26,9 @@ inline constexpr double most_value_of_time_w = 1e6;
 struct Way {
   std::vector<planning::Segment> path;
   std::optional<planning::Stations> stations = {};  // the path fetches at one and brings to the other
-  bool placed = true;   // false: distances without turns, which end at no known place
-  bool former = false;  // given by members of the version before
-
-  bool halts_stated() const { return stations && stations->halts_stated(); }
+  bool placed = true;         // false: distances without turns, which end at no known place
+  bool former = false;        // given by members of the version before
+  bool halts_stated = false;  // it states a dwell, possibly 0: no other halts are predicted
 };
 
 // A way and how it is to be driven.

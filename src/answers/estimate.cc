@@ -116,8 +116,7 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   const forecast::Forecaster& forecaster = *robot.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
   const auto legs = forecast::planned_legs(path);
-  const auto priced =
-      forecast::price(forecaster, pricer, legs, {}, drive.way.halts_stated() || forecast::states_halts(legs));
+  const auto priced = forecast::price(forecaster, pricer, legs, {}, drive.way.halts_stated);
   if (const auto stuck = forecast::obstacle(pricer, legs, priced)) return tl::unexpected(*stuck);
   const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
   const forecast::Prediction expected = forecaster.energy(sum);

@@ -142,8 +142,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
     legs.clear();
     for (const planning::Stretch& s : stretches)
       if (s.amount > 0) legs.push_back(leg_of(s, task.payload_kg));
-    const bool halts_stated = task.stations.halts_stated() || forecast::states_halts(legs);
-    const auto priced = forecast::price(forecaster, pricer, legs, {}, halts_stated);
+    const auto priced = forecast::price(forecaster, pricer, legs, {}, task.stations.halts_stated());
     if (auto stuck = forecast::obstacle(pricer, legs, priced)) {
       cell.obstacle = Obstacle::limits;
       if (!obstacle) obstacle = std::move(stuck);
@@ -378,14 +377,20 @@ struct MatrixContext : PathContext {
   std::size_t robots = 0;
 };
 
+planning::Leg take(ReadTask& read, ReadLeg&& one) {
+  read.former = read.former || one.way.former;
+  std::optional<double>& dwell_s = read.task.stations.dropoff_dwell_s;
+  if (one.way.halts_stated) dwell_s = dwell_s.value_or(0);
+  return std::move(one.leg);
+}
+
 void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
   const Json* empty = fields.member("empty");
   if (empty == nullptr) return;
   const auto add = [&](const Json& leg, std::string at) {
     ReadLeg one;
     leg_input().nested(leg, std::move(at), one, context, fields);
-    read.task.empty.push_back(std::move(one.leg));
-    read.former = read.former || one.way.former;
+    read.task.empty.push_back(take(read, std::move(one)));
   };
   if (!empty->is_array()) return add(*empty, fields.pointer("empty"));
   if (empty->size() != context.robots)
@@ -419,11 +424,7 @@ const Input<ReadTask, MatrixContext>& matrix_task_input() {
                   "towards it and a straight line",
                   read_empty)
           .object(
-              "loaded",
-              [](ReadTask& read, ReadLeg&& leg) {
-                read.task.loaded = std::move(leg.leg);
-                read.former = read.former || leg.way.former;
-              },
+              "loaded", [](ReadTask& read, ReadLeg&& leg) { read.task.loaded = take(read, std::move(leg)); },
               "route from the pick-up to the drop-off, in place of a turn and a straight line", leg_input(),
               Presence::optional)
           .check(check_stations);

@@ -100,10 +100,6 @@ PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs) {
   return sum;
 }
 
-bool states_halts(std::span<const PlannedLeg> legs) {
-  return std::ranges::any_of(legs, [](const PlannedLeg& leg) { return leg.motion == Motion::stand; });
-}
-
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
                              std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated) {
   const Habit habit = forecaster.habit.with(stated);

@@ -110,9 +110,6 @@ PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs);
 // Adds them to a plan.
 void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLeg> legs);
 
-// Whether a plan states the robot's halts.
-bool states_halts(std::span<const PlannedLeg> legs);
-
 // Legs priced at the stated pace, else by the robot's habit. Where the pace is not wholly stated, a leg may
 // be followed by one of the robot's usual halts, unless the plan itself states the halts.
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,

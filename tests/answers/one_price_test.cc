@@ -1,6 +1,7 @@
 // One task has one price in all calls.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -175,6 +176,21 @@ TEST_P(OnePrice, OfDwellsAndTheirAbsence) {
   for (const json& dwell_s : {json(), json(0), json(20)})
     expect_same(usual_by_matrix(distance_m, dwell_s), usual_by_autonomy(distance_m, dwell_s), 1e-6, 1e-6);
   EXPECT_GT(usual_by_matrix(distance_m, json()).duration_s, usual_by_matrix(distance_m, 0).duration_s);
+}
+
+// A dwell of no time in a path excludes other halts as one of little time does.
+TEST_P(OnePrice, OfADwellOfZero) {
+  const json straight = {{"kind", "straight"}, {"length_m", between(1, 30)}};
+  const auto prices = [&](const json& dwell_s) {
+    Task task{{{"path", {straight}}}};
+    if (!dwell_s.is_null()) task.way["path"].push_back({{"kind", "dwell"}, {"duration_s", dwell_s}});
+    return std::array{by_estimate(task, "usual"), by_matrix(task, "usual"), by_autonomy(task, "usual")};
+  };
+  const auto none = prices(0), little = prices(1e-9), usual = prices({});
+  for (std::size_t call = 0; call < none.size(); ++call) {
+    expect_same(none[call], little[call], 1e-6, 1e-6);
+    EXPECT_GT(usual[call].duration_s, 1.01 * none[call].duration_s);
+  }
 }
 
 TEST_P(OnePrice, OfThePlannersDriving) {
