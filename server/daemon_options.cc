@@ -128,6 +128,7 @@ std::vector<Error> faults_of(const DaemonOptions& options) {
   check(cluster_options(options));
   check(ingest::SignatureGate(options.ingest.signatures).read_keys());
   check(telemetry::check_lcm_url(options.ingest.lcm_url));
+  check(telemetry::parse_interface(options.ingest.listen.interface_address));
   check(telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from));
   if (!options.webhooks_file.empty()) check(server::read_webhooks(options.webhooks_file));
   if (!options.mqtt_url.empty()) check(mqtt_options(options));

@@ -13,7 +13,7 @@ EACH = 4  # tasks of a route; of 30 tasks there are 31930 sets of up to 4 and 17
 
 def prices(joulecast: Client, request: dict) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Energy [J] and duration [s] by robot, place (0: its pose, i + 1: where task i ends) and next task, infinite where the robot
-    cannot do it; energy [J] that each robot may spend to keep its reserve at 95 %."""
+    cannot do it; energy [J] that each robot may spend on two tasks or more to keep its reserve at 95 %."""
     robots, ways = request["robots"], [(task["pickup"], task["dropoff"]) for task in request["tasks"]]
     ends = [{"heading_rad": np.arctan2(b["y_m"] - a["y_m"], b["x_m"] - a["x_m"]), **b} for a, b in ways]
     starts = [robot | {"pose": pose} for robot in robots for pose in (robot["pose"], *ends)]
@@ -21,7 +21,7 @@ def prices(joulecast: Client, request: dict) -> tuple[np.ndarray, np.ndarray, np
     costs = np.array([[row["energy_j"], row["duration_s"]] for row in rows], float).reshape(len(robots), -1, 2, len(ways))
     asked = [{"robot_id": robot["robot_id"], "request": {"state_of_charge": robot["state_of_charge"]}} for robot in robots]
     forecasts = joulecast.computeFleetAutonomy(body={"robots": asked})["robots"]
-    spread = [np.hypot(f["consumption"]["common_deviation"], f["consumption"]["leg_deviation"]) for f in forecasts]
+    spread = [np.hypot(f["consumption"]["common_deviation"], f["consumption"]["leg_deviation"] / 2**0.5) for f in forecasts]
     budgets_j = [f["usable_energy_j"] - 1.645 * f["usable_energy_sd_j"] for f in forecasts] / np.exp(1.645 * np.array(spread))
     return np.nan_to_num(costs[:, :, 0], nan=np.inf), costs[:, :, 1], budgets_j
 

@@ -25,10 +25,10 @@ Eigen::Map<const Square> square(const std::array<Features, feature_count>& m) {
 
 Features moving_features(Motion motion, double payload_fraction, double amount, const LegCost& cost) {
   Features x{};
+  x[payload_feature] = amount * payload_fraction;
   if (motion == Motion::turn) x[2] = amount;
   if (motion == Motion::drive) {
     x[1] = amount;
-    x[payload_feature] = amount * payload_fraction;
     x[4] = amount * (cost.speed_fraction - middle_speed);
   }
   return x;
@@ -43,7 +43,9 @@ Features features_of(Motion motion, double payload_fraction, const LegCost& cost
 }
 
 Features duration_features_of(Motion motion, double payload_fraction, const LegCost& cost) {
-  return moving_features(motion, payload_fraction, cost.duration_s, cost);
+  Features x = moving_features(motion, payload_fraction, cost.duration_s, cost);
+  x[0] = cost.runs_on;
+  return x;
 }
 
 double Correction::energy_j(const Features& x) const {
@@ -56,15 +58,15 @@ double Correction::variance_j2(const Features& x) const {
 
 Correction untried(Subject subject) {
   Correction prior;
-  constexpr Features energies{0.15, 0.25, 0.25, 0.35, 0.1}, durations{0.05, 0.05, 0.05, 0.02, 0.05};
+  constexpr Features energies{0.155, 0.35, 1.1, 0.29, 0.19}, durations{0.1, 0.055, 0.045, 0.01, 0.04};
   const Features& deviation = is_duration(subject) ? durations : energies;
+  if (is_duration(subject)) prior.mean[0] = 0;
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
-  const double correlation = is_duration(subject) ? 0 : 0.5;
   const auto correlate = [&](std::size_t a, std::size_t b, double by) {
     prior.covariance[a][b] = prior.covariance[b][a] = by * deviation[a] * deviation[b];
   };
-  correlate(1, 2, correlation), correlate(1, payload_feature, correlation);
-  correlate(2, payload_feature, correlation * correlation);
+  if (!is_duration(subject))
+    correlate(1, 2, 0.8), correlate(1, payload_feature, 0.5), correlate(2, payload_feature, 0.5);
   return prior;
 }
 

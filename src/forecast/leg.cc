@@ -46,12 +46,12 @@ void LegTracker::begin() {
   legs_.clear();
 }
 
-void LegTracker::end_current() {
+LegTracker::Piece LegTracker::end_current() {
   if (slowed_) current_->join(*std::exchange(slowed_, std::nullopt));
   if (pending_) current_->join(*std::exchange(pending_, std::nullopt));
   close(*current_);
-  current_.reset();
   peak_ = 0;
+  return *std::exchange(current_, std::nullopt);
 }
 
 void LegTracker::go_on(const Piece& piece, double rim_m_s) {
@@ -85,7 +85,7 @@ void LegTracker::add(const LegSample& sample) {
   const double speed = 0.5 * (before->speed_m_s + sample.speed_m_s);
   const double yaw = 0.5 * (before->yaw_rate_rad_s + sample.yaw_rate_rad_s);
   Piece piece;
-  const std::array<double, 2>& command = before->command;  // in force until now
+  std::array<double, 2> command = before->command;  // in force until now
   piece.motion = motion_of(speed, yaw);
   // A leg begins with its command.
   if (piece.motion == Motion::stand && std::isfinite(command[0] + command[1]))
@@ -98,6 +98,8 @@ void LegTracker::add(const LegSample& sample) {
   piece.square_rad2_s = yaw * yaw * h;
   piece.payload_kg = std::isfinite(sample.payload_kg) ? sample.payload_kg : 0;
   piece.battery_j = 0.5 * (before->power_w + sample.power_w) * h;
+  // It is to turn or to drive, on a curve too; unknown ones remain so.
+  command[std::fabs(command[0]) < 0.5 * half_track_m_ * std::fabs(command[1]) ? 0 : 1] *= 0;
   for (std::size_t k = 0; k < piece.commanded.size(); ++k) {
     const double size = std::fabs(command[k]);
     piece.commanded[k] = {size * h, size > 0 ? h : 0, size};
@@ -120,9 +122,10 @@ void LegTracker::add(const LegSample& sample) {
     }
     if (pending_->duration_s >= settle_s) {
       std::optional<Piece> next = std::exchange(pending_, std::nullopt);
-      // The command to drive precedes the end of a turn.
-      if (current_->motion == Motion::turn) next->commanded[0].join(current_->commanded[0]);
-      end_current();
+      const Piece ended = end_current();
+      // The command of the next leg precedes the end of this one.
+      const std::size_t kind = next->motion == Motion::turn ? 1 : 0;
+      if (ended.motion != Motion::stand) next->commanded[kind].join(ended.commanded[kind]);
       current_ = next;
       peak_ = rim_m_s;
     }

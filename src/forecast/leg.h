@@ -82,7 +82,7 @@ class LegTracker {
   void close(const Piece& piece);
   // Adds to the current leg, which ends at its slowest point when it accelerates again.
   void go_on(const Piece& piece, double speed);
-  void end_current();
+  Piece end_current();
 
   double half_track_m_;
   double still_m_s_;

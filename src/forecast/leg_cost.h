@@ -38,6 +38,7 @@ struct LegCost {
   double standing_j = 0;
   double motor_j = 0;
   double speed_fraction = 0;  // cruise over the robot's limit
+  double runs_on = 0;         // 1: a past leg that may last into the time of the halt after it
   bool slower = false;        // than wanted, limited by the motors
   bool impossible = false;    // the motors cannot move the robot; the costs are of standing still
 };

@@ -94,7 +94,7 @@ double Prediction::quantile(double probability) const {
 }
 
 double Prediction::mean() const {
-  return fixed + legs * scores->mean_factor(inflation * spread) + halts.mean();
+  return fixed + legs * scores->mean_factor(inflation * scatter) + halts.mean();
 }
 
 double Prediction::probability_below(double amount, double deviation) const {

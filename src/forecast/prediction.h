@@ -35,6 +35,7 @@ struct Prediction {
   double fixed = 0;  // exact
   double legs = 0;
   double spread = 0;
+  double scatter = 0;  // the spread without the correction's error: corrected amounts are means
   HaltDistribution halts;
   double inflation = 1;
   const ScoreDistribution* scores = nullptr;  // of the Forecaster

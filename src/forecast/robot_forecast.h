@@ -79,10 +79,10 @@ class Forecaster {
 // Learns from the missions of one robot as they end, against its model in force. Each mission is first
 // predicted from the missions before it; its score then calibrates the intervals (prequential split
 // conformal). The scores of a robot with few missions are those of another forecast than the one in force:
-// they are biased and have another width. Each time that the number of missions has grown by a quarter, all
-// are therefore scored again, each by the others (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021).
-// The hit or miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the
-// width). Missions before the robot's last change (drift/marks.h) are set aside.
+// they are biased and have another width. Each time that a quarter of the kept missions is new, all is
+// estimated from the kept ones again, each scored by the others (jackknife+, Barber, Candes, Ramdas and
+// Tibshirani 2021). The hit or miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the
+// logarithm of the width). Missions before the robot's last change (drift/marks.h) are set aside.
 class RobotForecast {
  public:
   static constexpr std::size_t most_missions = 120;  // kept to learn again when the model changes
@@ -129,7 +129,7 @@ class RobotForecast {
     PlanSum sum;          // of the foreseen
 
     Prediction predicted(Subject subject, const Forecaster& by) const;
-    double score(Subject subject, const Forecaster& by) const;
+    double score(const Prediction& p) const;
   };
 
   // Of the siblings; null without.
@@ -140,10 +140,9 @@ class RobotForecast {
   Seen seen(Subject subject, const PastMission& mission, const Forecaster& now) const;
   Forecaster with_track(Subject subject) const;
   void score(Subject subject, const PastMission& mission);
-  void learn_scatter(Subject subject, const Seen& seen, const Forecaster::Track& now, double ratio);
-  void refit(Subject subject);
-  void settle();
-  void score_anew(Subject subject);
+  void learn_scatter(Subject subject, const Seen& seen, const Correction& fitted);
+  void learn_common(Subject subject, const Seen& seen, const Forecaster& without);
+  void settle(Subject subject);
   bool changed(const PastMission& before, const PastMission& now) const;
   bool changed_at(std::size_t k) const { return k > 0 && changed(missions_[k - 1], missions_[k]); }
 

@@ -6,7 +6,7 @@
 namespace joulecast::forecast {
 namespace {
 
-constexpr double between = 0.2;       // standard deviation between robots that is assumed, of the prior's
+constexpr double between = 0.13;      // standard deviation between robots that is assumed, of the prior's
 constexpr double between_weight = 3;  // robots that the assumption counts for
 constexpr std::int64_t least_missions = 3;
 constexpr std::size_t scores_each = 40;

@@ -76,6 +76,12 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
   return parsed;
 }
 
+Result<std::uint32_t> parse_interface(const std::string& text) {
+  const auto address = parse_address(text.empty() ? "0.0.0.0" : text);
+  if (!address) return invalid("lcm.bind_address", "'" + text + "' is no IPv4 address");
+  return *address;
+}
+
 Result<AcceptedSenders> AcceptedSenders::parse(std::string_view list) {
   AcceptedSenders accepted;
   while (!list.empty()) {
@@ -175,11 +181,8 @@ Result<std::unique_ptr<DatagramSocket>> DatagramSocket::open(const UdpmUrl& url,
   };
   ip_mreq membership{};
   membership.imr_multiaddr.s_addr = htonl(url.group);
-  if (!interface_address.empty()) {
-    const auto address = parse_address(interface_address);
-    if (!address) return invalid("lcm.bind_address", "'" + interface_address + "' is no IPv4 address");
-    membership.imr_interface.s_addr = htonl(*address);
-  }
+  TRY_ASSIGN(const std::uint32_t own, parse_interface(interface_address));
+  membership.imr_interface.s_addr = htonl(own);
   descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (descriptor < 0) return failed("lcm.url", "cannot open a socket");
   // As liblcm does: several programs of one host listen to one group.

@@ -27,6 +27,9 @@ struct UdpmUrl {
 // sender's and only checked here.
 [[nodiscard]] Result<UdpmUrl> parse_udpm_url(std::string_view url);
 
+// The IPv4 address of an interface in host byte order; of an empty text, any.
+[[nodiscard]] Result<std::uint32_t> parse_interface(const std::string& text);
+
 // The addresses that may send messages.
 class AcceptedSenders {
  public:

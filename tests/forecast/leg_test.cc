@@ -149,6 +149,31 @@ TEST(LegTracker, ReadsPlansFromCommands) {
   EXPECT_EQ(legs[0].planned_way, 0);
 }
 
+// Commands to drive, turn and drive without halts between them, followed 0.3 s late.
+TEST(LegTracker, NextPlansPrecedeStops) {
+  LegTracker tracker(shipped("amr"));
+  tracker.begin();
+  constexpr double v = 0.8, yaw = 1, ramp_s = 1, cruise_s = 2, leg_s = 2 * ramp_s + cruise_s, late_s = 0.3;
+  const auto trapezoid = [](double t) {
+    return std::max(0.0, std::min({1.0, t / ramp_s, (leg_s - t) / ramp_s}));
+  };
+  const auto command = [&](double t) {
+    return std::array{v * (trapezoid(t) + trapezoid(t - 2 * leg_s)), yaw * trapezoid(t - leg_s)};
+  };
+  for (int k = 0; k <= std::lround((3 * leg_s + 2) / h); ++k) {
+    const double t = k * h - 1;
+    const auto [speed, yaw_rate] = command(t - late_s);
+    tracker.add({k == 0 ? 0 : h, speed, yaw_rate, 50, 0, command(t)});
+  }
+  const std::vector<Leg> legs = tracker.take();
+  ASSERT_EQ(legs.size(), 5u);
+  const double still = still_speed_m_s(shipped("amr"));
+  for (const std::size_t k : {1, 2, 3}) {
+    EXPECT_NEAR(legs[k].planned_way, (k == 2 ? yaw : v) * (ramp_s + cruise_s), 2e-3) << k;
+    EXPECT_NEAR(legs[k].planned_s, leg_s, 2 * still * ramp_s / v + 2 * h) << k;
+  }
+}
+
 TEST(LegTracker, BlockedRobotsStand) {
   LegTracker tracker(shipped("amr"));
   tracker.begin();

@@ -47,6 +47,23 @@ TEST(Prediction, OnlyOwnScatterAveragesOut) {
   }
 }
 
+// Fewer missions of a robot widen the intervals of its energy; the expected one is the model's.
+TEST(Prediction, UncertaintyKeepsTheMean) {
+  double width = 0;
+  for (const double deviation : {0.0, 0.1, 0.3, 0.5}) {
+    Forecaster f = forecaster(0.01, 0.02);
+    for (Forecaster::Track& track : f.tracks)
+      for (std::size_t k = 0; k < feature_count; ++k)
+        track.correction.covariance[k][k] = deviation * deviation;
+    PlanSum sum;
+    for (int k = 0; k < 4; ++k) f.extend(sum, drive(500));
+    const Prediction p = f.energy(sum);
+    EXPECT_NEAR(p.mean(), 2000 * (1 + 0.5 * (0.01 * 0.01 + 0.02 * 0.02 / 4)), 0.2);
+    EXPECT_GT(p.quantile(0.95) - p.quantile(0.05), width);
+    width = p.quantile(0.95) - p.quantile(0.05);
+  }
+}
+
 // Missions drawn from the predictive distribution: the probability of staying within a budget is the share of
 // those that do. Where the budget is uncertain too, its part is taken into the width, which is exact for
 // normals.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "client/virtual_robot/rng.h"
 #include "robots.h"
@@ -278,6 +279,95 @@ TEST(RobotForecast, FirstPayloadsWidenIntervals) {
   EXPECT_LT(width(0), 0.05);
   EXPECT_GT(width(full_kg), 3 * width(0));
   EXPECT_GT(width(full_kg), 1.5 * width(0.3 * full_kg));
+}
+
+// Each mission has one payload; a full one makes drives and turns a third dearer than by the model.
+TEST(RobotForecast, PayloadsMakeTurnsDearer) {
+  MadeMissions made(12);
+  Rng rng(13);
+  const LegPricer pricer(made.robot, made.drive);
+  const Pace pace = default_pace(made.robot);
+  const double full_kg = made.robot.limits.payload_kg;
+  const auto leg_of = [&](Motion motion, double way, double payload_kg) {
+    const LegCost cost = pricer.paced(PlannedLeg{motion, way, 0, payload_kg, 0}, pace);
+    return Leg{motion,
+               cost.duration_s,
+               way,
+               motion == Motion::turn ? pace.yaw_rate_rad_s : pace.speed_m_s,
+               0,
+               payload_kg,
+               cost.standing_j + (1 + payload_kg / full_kg / 3) * cost.motor_j};
+  };
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 20; ++k) {
+    const double payload_kg = k % 2 == 0 ? 0 : rng.uniform(0.2, 1) * full_kg;
+    PastMission mission{1 + k, {}};
+    for (int leg = 0; leg < 8; ++leg) {
+      mission.legs.push_back(leg_of(Motion::turn, rng.uniform(2, 3), payload_kg));
+      mission.legs.push_back(leg_of(Motion::drive, rng.uniform(4, 9), payload_kg));
+      for (Leg& last : std::span(mission.legs).last(2)) last.battery_j *= 1 + 0.01 * rng.normal();
+    }
+    forecast.learn(std::move(mission));
+  }
+  const auto f = forecast.forecaster();
+  PlanSum sum;
+  double truth_j = 0;
+  for (int k = 0; k < 10; ++k) {
+    f->extend(sum,
+              {Motion::turn, full_kg, 0, pricer.paced(PlannedLeg{Motion::turn, 2.5, 0, full_kg, 0}, pace)});
+    truth_j += leg_of(Motion::turn, 2.5, full_kg).battery_j;
+  }
+  EXPECT_NEAR(f->energy(sum).quantile(0.5), truth_j, 0.02 * truth_j);
+}
+
+// Downhill, whole missions recover more energy than they spend.
+TEST(RobotForecast, LearnsFromRecoveredEnergy) {
+  MadeMissions made(14);
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 12; ++k) forecast.learn(made.next(-0.5, 0.02, 0.05));
+  const auto f = forecast.forecaster();
+  const Prediction p = f->energy(plan_of(*f, made));
+  EXPECT_TRUE(std::isfinite(p.quantile(0.05)));
+  EXPECT_TRUE(std::isfinite(p.quantile(0.95)));
+}
+
+// Motions end 0.4 s after their commands, in the time of halts of 1 s: the time and energy of plans with such
+// halts, which commands state, are those of the missions.
+TEST(RobotForecast, HaltsContainLateStops) {
+  MadeMissions made(15);
+  Rng rng(16);
+  const LegPricer pricer(made.robot, made.drive);
+  const Pace pace = default_pace(made.robot);
+  const double halt_s = 1, late_s = 0.4, still_w = pricer.standing_w();
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 20; ++k) {
+    PastMission mission{1 + k, {}};
+    for (int j = 0; j < 16; ++j) {
+      const double way = rng.uniform(4, 9);
+      const LegCost cost = pricer.paced(PlannedLeg{Motion::drive, way, 0, 0, 0}, pace);
+      const bool halts = rng.chance(0.5);
+      const double longer_s = halts ? late_s : 0;
+      mission.legs.push_back({Motion::drive, cost.duration_s + longer_s, way, pace.speed_m_s, 0, 0,
+                              cost.standing_j + cost.motor_j + still_w * longer_s, way, pace.speed_m_s,
+                              cost.duration_s});
+      if (halts)
+        mission.legs.push_back({Motion::stand, halt_s - late_s, 0, 0, 0, 0, still_w * (halt_s - late_s)});
+    }
+    forecast.learn(std::move(mission));
+  }
+  const auto f = forecast.forecaster();
+  PlanSum sum;
+  double truth_s = 0, truth_j = 0;
+  for (int k = 0; k < 10; ++k) {
+    for (const PlannedLeg& leg :
+         {PlannedLeg{Motion::drive, 5, 0, 0, 0}, PlannedLeg{Motion::stand, 0, 0, 0, 1}}) {
+      const LegCost cost = pricer.paced(leg, pace);
+      f->extend(sum, {leg.motion, 0, leg.way, cost});
+      truth_s += cost.duration_s, truth_j += cost.standing_j + cost.motor_j;
+    }
+  }
+  EXPECT_NEAR(f->duration(sum).quantile(0.5) / truth_s, 1, 0.003);
+  EXPECT_NEAR(f->energy(sum).quantile(0.5) / truth_j, 1, 0.003);
 }
 
 // A robot that has followed one plan exactly takes as long for another, with any payload.

@@ -201,13 +201,14 @@ TEST(CheckConfig, ReportsUnusableAddresses) {
   options.http.address = "localhost";
   options.http.trusted_proxies = {"proxy"};
   options.ingest.lcm_url = "udpm://10.0.0.1:7667";
+  options.ingest.listen.interface_address = "eth0";
   std::vector<std::string> fields;
   for (const Error& fault : faults_of(options)) {
     fields.push_back(fault.field);
     if (fault.field != "http.address") continue;
     EXPECT_EQ(fault.message, "must be an IPv4 or IPv6 address, is localhost");
   }
-  for (const char* field : {"http.address", "http.trusted_proxies", "lcm.url"})
+  for (const char* field : {"http.address", "http.trusted_proxies", "lcm.url", "lcm.bind_address"})
     EXPECT_EQ(std::ranges::count(fields, field), 1) << field;
 }
 
