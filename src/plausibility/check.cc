@@ -34,12 +34,6 @@ void shorten(std::vector<Check>& checks) {
   }
 }
 
-// The drive with the effects that the catalogue accepts.
-dynamics::DriveModel drive_of(const robot::RobotModel& robot) {
-  const auto effects = dynamics::active_effects(robot);
-  return {robot, effects ? *effects : std::vector<dynamics::ActiveEffect>{}};
-}
-
 // The checks in sequence: channels contradicted by one check are not used by the next.
 std::vector<Check> run_checks(CheckContext context,
                               std::initializer_list<void (*)(const CheckContext&, Checks&)> some) {
@@ -49,8 +43,10 @@ std::vector<Check> run_checks(CheckContext context,
     check(context, checks);
     if (contradicts_clock(checks)) break;
     for (std::size_t n = before; n < checks.size(); ++n)
-      for (const std::size_t k : readings_of(checks[n].contradicted ? checks[n].channel : "")) {
-        context.silent |= 1u << k;
+      if (checks[n].contradicted) {
+        const bool radius = checks[n].channel == radius_of_file;  // the way of the wheels is not known
+        for (const std::size_t k : readings_of(radius ? "wheel_velocity" : checks[n].channel))
+          context.silent |= 1u << k;
         context.evidence.reset();
       }
   }

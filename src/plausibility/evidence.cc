@@ -128,7 +128,8 @@ class Gatherer {
       const Powers powers{{motor_current + k, 1}, {wheel + k, -1}};
       add(motor + "current for acceleration is", "that of the file's inertia",
           motors_[k].current_per_rad_s2_a * (p_.torque_constant_nm_a / inertia), inertia_off, 6,
-          {{motor_current + k, 1}, {wheel + k, -1}, {time_scale, 1}}, {.property = P::inertia});
+          {{motor_current + k, 1}, {wheel + k, -1}, {time_scale, 1}, {half_radius, -2}, {double_radius, -2}},
+          {.property = P::inertia});
       const double friction_nm =
           p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * motors_[k].mean_speed_rad_s;
       if (friction_nm > 0)
@@ -149,7 +150,11 @@ class Gatherer {
     for (std::size_t k : {0u, 1u}) {
       add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
           "the turning by the file's track", ratio[k], turn_off, trust_of_sides(ratio, 8),
-          {{by, 1}, {wheel + k, -1}, {time_scale, by == heading ? -1.0 : 0.0}},
+          {{by, 1},
+           {wheel + k, -1},
+           {half_radius, -1},
+           {double_radius, -1},
+           {time_scale, by == heading ? -1.0 : 0.0}},
           {.property = track_by, .turned_by = 1});
     }
   }
@@ -174,12 +179,12 @@ class Gatherer {
   }
 
   void moving() {
+    const Powers way{{x, 1}, {wheel, -1}, {half_radius, -1}, {double_radius, -1}, {time_scale, -1}};
     add("the map moves forward", "the way of the wheels by the file's radius",
-        c_.coefficient(Relation::slip, 0, {1, 2, 3, 4}), travel_off, 12,
-        {{x, 1}, {wheel, -1}, {time_scale, -1}},
+        c_.coefficient(Relation::slip, 0, {1, 2, 3, 4}), travel_off, 12, way,
         {.property = P::radius, .both_sides = true, .lost_by = {heading}});
     add("the map moves", "the way of the wheels by the file's radius",
-        c_.coefficient(Relation::distance, 0, {1}), travel_off, 12, {{x, 1}, {wheel, -1}, {time_scale, -1}},
+        c_.coefficient(Relation::distance, 0, {1}), travel_off, 12, way,
         {.property = P::radius, .magnitude = true, .both_sides = true});
     // The predominant direction of travel is weak evidence for the forward direction.
     add("the way forward, less that backward, is", "all the way that the wheels make",
@@ -188,14 +193,16 @@ class Gatherer {
                             c_.coefficient(Relation::command, 1, {2, 3})};
     for (std::size_t k : {0u, 1u}) {
       add(std::string("the ") + side_name[k] + " wheel drives at", "the commanded speed", driven[k],
-          command_off, trust_of_sides(driven, 5), {{wheel + k, 1}, {command_speed, -1}},
+          command_off, trust_of_sides(driven, 5),
+          {{wheel + k, 1}, {half_radius, 1}, {double_radius, 1}, {command_speed, -1}},
           {.property = P::following});
     }
     const Estimate turned = c_.coefficient(Relation::command_turn, 0, {1});
     const bool surely = std::fabs(std::log(std::fabs(turned.value))) < track &&
                         turned.sd < alike_sides * std::fabs(turned.value);
     add("the wheels turn the robot at", "the commanded yaw rate", turned, {track, skid},
-        surely ? surely_trust : 6, {{wheel, 1}, {command_turn, -1}}, {.turned_by = 1, .both_sides = true});
+        surely ? surely_trust : 6, {{wheel, 1}, {half_radius, 1}, {double_radius, 1}, {command_turn, -1}},
+        {.turned_by = 1, .both_sides = true});
   }
 
   void batteries() {
@@ -227,44 +234,52 @@ class Gatherer {
   // The battery's power while the robot drives, and its parts for speed and acceleration. A wrong scale of
   // the wheels' speeds acts on each by another exponent than one of the power.
   void moved_power(const Powers& power) {
-    constexpr Eigen::Index modelled = 1, one = 2, steady = 4, accelerating = 5, climbing = 6, half = 7,
-                           turning = 8;
+    constexpr Eigen::Index modelled = 1, one = 2, steady = 4, accelerating = 5, climbing = 6, turning = 7,
+                           slower = 8, larger = 9, smaller = 11;
     const std::vector<Products::Block> blocks = c_.blocks(Relation::driving);
     if (blocks.empty()) return;
     Products::Block all = blocks.front();
     for (const Products::Block& block : std::span(blocks).subspan(1)) all.join(block);
-    const auto by_model = [&](const char* says, const Estimate& ratio, const Off& off, double at_half,
-                              Eigen::Index whole, EvidenceTraits traits) {
+    // `other`: on wheels of half the speed, and where the file's radius is half or double the robot's.
+    using Other = std::array<double, 3>;
+    const auto by_model = [&](const char* says, const Estimate& ratio, const Off& off, Eigen::Index whole,
+                              const Other& other, EvidenceTraits traits) {
       Powers powers = power;
-      powers.emplace_back(wheel, -std::log2(all.sums(one, whole) / at_half));
+      const double sum = all.sums(one, whole);
+      powers.insert(powers.end(), {{wheel, std::log2(other[0] / sum)},
+                                   {half_radius, -std::log2(other[1] / sum)},
+                                   {double_radius, std::log2(other[2] / sum)}});
       traits.by_power = traits.both_sides = true;
       traits.lost_by = {payload, time_scale};
-      if (std::isfinite(powers.back().second))
+      if (std::ranges::all_of(powers, [](const auto& p) { return std::isfinite(p.second); }))
         add(says, "what the model gives", ratio, off, 8, powers, std::move(traits));
     };
-    const double steady_at_half = all.sums(one, half),
-                 accelerating_at_half = 0.25 * all.sums(one, accelerating);
+    const auto sum = [&](Eigen::Index k) { return all.sums(one, k); };
+    const double idle = sum(modelled) - sum(steady) - sum(accelerating);
+    const Other steady_of_other{sum(slower), sum(larger), sum(smaller)},
+        accelerating_of_other{0.25 * sum(accelerating), sum(larger + 1), sum(smaller + 1)};
+    Other modelled_of_other;
+    for (const std::size_t k : {0u, 1u, 2u})
+      modelled_of_other[k] = idle + steady_of_other[k] + accelerating_of_other[k];
     by_model("while the robot drives, the battery's power is", c_.ratio(Relation::driving, 0, modelled, one),
-             load_off,
-             all.sums(one, modelled) - all.sums(one, steady) - all.sums(one, accelerating) + steady_at_half +
-                 accelerating_at_half,
-             modelled, {.property = P::driving_power});
+             load_off, modelled, modelled_of_other, {.property = P::driving_power});
     const BlockFit fit = fit_blocks(blocks, 0, {one, steady, accelerating, climbing, turning});
     if (!fit.known()) return;
-    Eigen::VectorXd rest = Eigen::VectorXd::Unit(turning + 1, 0);
+    Eigen::VectorXd rest = Eigen::VectorXd::Unit(all.sums.rows(), 0);
     rest({one, steady, accelerating, climbing, turning}) = -fit.coefficient;
     const double left = std::sqrt(std::max(rest.dot(all.sums * rest), 0.0));
-    const auto part = [&](const char* says, Eigen::Index k, double scale, double at_half, Property property) {
+    const auto part = [&](const char* says, Eigen::Index k, double scale, const Other& other,
+                          Property property) {
       const Estimate ratio = estimate(fit, k == steady ? 1 : 2);
       if (ratio.value > 0)
-        by_model(says, ratio, {scale, scale}, at_half, k,
+        by_model(says, ratio, {scale, scale}, k, other,
                  {.property = property,
                   .magnitude = true,
                   .heavy_tails = true,
                   .unexplained = correlated * left / (ratio.value * std::sqrt(all.sums(k, k)))});
     };
-    part("at steady speed, the battery's power is", steady, friction_scale, steady_at_half, P::steady_power);
-    part("for acceleration, the battery's power is", accelerating, mass_scale, accelerating_at_half,
+    part("at steady speed, the battery's power is", steady, friction_scale, steady_of_other, P::steady_power);
+    part("for acceleration, the battery's power is", accelerating, mass_scale, accelerating_of_other,
          P::accelerating_power);
   }
 
@@ -272,7 +287,7 @@ class Gatherer {
     add("uphill and downhill, the battery's power changes by", "the power of the pitch",
         c_.coefficient(Relation::climb, 0, {1, 2}), load_off, 8,
         {{pitch, -1}, {wheel, 1}, {battery_voltage, 1}, {battery_current, 1}},
-        {.lost_by = {pitch, wheel, wheel + 1, battery_current, battery_voltage}});
+        {.lost_by = {pitch, wheel, wheel + 1, half_radius, double_radius, battery_current, battery_voltage}});
     if (const ValueTally& pitches = c_.tally(pitch); pitches.known() > 1)
       most({pitch}, "the pitch usually is", "the steepest that robots climb, 20 degrees", usual_size(pitches),
            steepest_rad, 10, {0, limit_off[1]});
@@ -281,9 +296,12 @@ class Gatherer {
   // `of`: the readings that determine the value.
   void most(std::initializer_list<std::size_t> of, const std::string& says, const char* limit, double value,
             double bound, double trust, Off off = limit_off, Property property = P::none) {
-    if (c_.heard(of) && bound > 0 && value > 0)
-      add(says, limit, exactly(value / bound), off, trust, {{*of.begin(), 1}},
-          {.property = property, .magnitude = true, .both_sides = *of.begin() == wheel});
+    if (!c_.heard(of) || !(bound > 0) || !(value > 0)) return;
+    const bool by_wheels = *of.begin() == wheel;
+    Powers powers{{*of.begin(), 1}};
+    if (by_wheels) powers.insert(powers.end(), {{half_radius, 1}, {double_radius, 1}});
+    add(says, limit, exactly(value / bound), off, trust, std::move(powers),
+        {.property = property, .magnitude = true, .both_sides = by_wheels});
   }
 
   void limits() {

@@ -35,8 +35,9 @@ constexpr bool is_lasting(Property property) {
   return property >= Property::voltage_constant;
 }
 
-// The scale of utime, as a reading of evidence.
-inline constexpr std::size_t time_scale = reading_count;
+// The scale of utime and the wheel radius of the robot file, halved or doubled, as readings of evidence.
+inline constexpr std::size_t time_scale = reading_count, half_radius = time_scale + 1,
+                             double_radius = half_radius + 1, factor_count = double_radius + 1;
 
 // How errors of channels act on evidence.
 struct EvidenceTraits {

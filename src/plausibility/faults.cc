@@ -34,7 +34,7 @@ struct Combined {
       surprise += fault->surprise;
     }
   }
-  std::array<double, time_scale + 1> factor;
+  std::array<double, factor_count> factor;
   std::uint32_t swaps = 0;
   double surprise = 0;
 };
@@ -195,6 +195,10 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
        {"counted half (0.5 times the motion)", 0.5, odd_nats},
        {"counted a quarter (0.25 times the motion)", 0.25, odd_nats},
        {"multiplied by 2 pi once too often", 2 * std::numbers::pi, odd_nats}});
+  add("wheel_radius", std::string(radius_of_file), {double_radius},
+      {{"the wheel's diameter in the robot file", 2, unit_nats}});
+  add("wheel_radius", std::string(radius_of_file), {half_radius},
+      {{"half the wheel's radius in the robot file", 0.5, odd_nats}});
   for (std::size_t k : {0u, 1u})
     add("wheel_velocity", std::string("wheel_velocity.") + side_name[k], {wheel_velocity + k},
         {{reversed, -1, sign_nats}});

@@ -12,11 +12,12 @@
 
 namespace joulecast::plausibility {
 
-// A wrong sign, unit or factor of one channel: the factors of its readings, or swapped sides.
+// A wrong sign, unit or factor of one channel, or of the file's wheel radius: the factors of its readings, or
+// swapped sides.
 struct ChannelFault {
   std::string id, channel;
   std::string cause;  // "given in rpm"
-  std::array<double, time_scale + 1> factor;
+  std::array<double, factor_count> factor;
   std::uint32_t swaps = 0;  // bits as in EvidenceTraits::turned_by
   double surprise = 0;      // negative log prior probability, in nats
 };

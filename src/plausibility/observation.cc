@@ -35,10 +35,24 @@ double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
+robot::RobotModel on_wheels(robot::RobotModel robot, double times) {
+  robot.kinematics.wheel_radius_m *= times;
+  return robot;
+}
+
 }  // namespace
 
+dynamics::DriveModel drive_of(const robot::RobotModel& robot) {
+  const auto effects = dynamics::active_effects(robot);
+  return {robot, effects ? *effects : std::vector<dynamics::ActiveEffect>{}};
+}
+
 Observer::Observer(const robot::RobotModel& robot, const dynamics::DriveModel& drive)
-    : robot_(robot), model_(drive), limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
+    : robot_(robot),
+      model_(drive),
+      larger_(drive_of(on_wheels(robot, 2))),
+      smaller_(drive_of(on_wheels(robot, 0.5))),
+      limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
 
 void Observer::begin(std::string mission_id, double declared_payload_kg) {
   seen_ = {};
@@ -188,13 +202,15 @@ void Observer::take_power(const Cell& c) {
   const double climb = weight * speed * std::sin(c.mean[reading::pitch]);
   relate(Relation::climb, {wr, wl, vb, ib, reading::pitch}, {c.battery_power_w - modelled, climb, 1.0});
   if (flow.ledger[signals::Term::kinetic] < 0) return;
+  const double larger = larger_.flow(at).battery_power_w, smaller = smaller_.flow(at).battery_power_w;
   at.wheel_acceleration_rad_s2 = {};
-  const double steady = model_.flow(at).battery_power_w - idle;
+  const auto steady_w = [&](const dynamics::DriveModel& m) { return m.flow(at).battery_power_w - idle; };
+  const double steady = steady_w(model_), on_larger = steady_w(larger_), on_smaller = steady_w(smaller_);
   for (double& w : at.wheel_speed_rad_s) w *= 0.5;
   relate(Relation::driving, {wr, wl, vb, ib},
          {c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0), steady,
-          modelled - idle - steady, or_zero(climb), model_.flow(at).battery_power_w - idle,
-          std::fabs(c.mean[wr] - c.mean[wl])});
+          modelled - idle - steady, or_zero(climb), std::fabs(c.mean[wr] - c.mean[wl]), steady_w(model_),
+          on_larger, larger - idle - on_larger, on_smaller, smaller - idle - on_smaller});
 }
 
 void Observer::take(const Span& s) {

@@ -28,20 +28,21 @@ enum class Relation : std::size_t {
   armature_difference,  // V, i, w, acceleration: right minus left
   torque_right,         // i, sign, w, common and differential acceleration, side slip, 1; the wheel turning
   torque_left,
-  motors,        // battery power, power of both motors, 1
-  driving,       // battery power, the model's, 1, battery power plus that of descents, the model's at steady
-                 // speed and for acceleration, m g v sin(pitch), the model's at half that speed, turning;
-                 // where the model has no braking
-  idle,          // battery power, 1; standing
-  motion,        // battery power, the model's, 1
-  sag,           // changes of the battery's voltage, of its current, from one cell to the next; the
-                 // latter again, or 0 unless the motors brake in both
-  climb,         // battery power less the model's, m g v sin(pitch), 1
-  gyro,          // yaw rate, w right, w left, 1
-  way,           // speed of the robot by the wheels, its magnitude, 1
-  command,       // speed of the right wheel, of the left, of the command, turn commanded
-  command_turn,  // turning of the wheels, of the command
-  heading_gyro,  // turned by the map in rad, in degrees, by the gyro, time
+  motors,   // battery power, power of both motors, 1
+  driving,  // battery power, the model's, 1, battery power plus that of descents, the model's at steady
+            // speed and for acceleration, m g v sin(pitch), turning, the model's at half that speed, at
+            // steady speed and for acceleration on wheels of double the radius, the same on wheels of half
+            // the radius; where the model has no braking
+  idle,     // battery power, 1; standing
+  motion,   // battery power, the model's, 1
+  sag,      // changes of the battery's voltage, of its current, from one cell to the next; the
+            // latter again, or 0 unless the motors brake in both
+  climb,    // battery power less the model's, m g v sin(pitch), 1
+  gyro,     // yaw rate, w right, w left, 1
+  way,      // speed of the robot by the wheels, its magnitude, 1
+  command,  // speed of the right wheel, of the left, of the command, turn commanded
+  command_turn,    // turning of the wheels, of the command
+  heading_gyro,    // turned by the map in rad, in degrees, by the gyro, time
   heading_wheels,  // turned by the map in rad, in degrees, by the right wheel, by the left
   distance,        // moved by the map, by the wheels
   siblings,        // current of the right motor, of the left, 1; both in the wheels' direction, straight on
@@ -81,6 +82,9 @@ struct Observation {
   double least_leap_rad_s = std::numeric_limits<double>::infinity(), farthest_leap_rad_s = 0;
 };
 
+// The drive with the effects that the catalogue accepts.
+dynamics::DriveModel drive_of(const robot::RobotModel& robot);
+
 // Builds an observation from a mission's samples, one by one. Work and memory per sample do not grow.
 class Observer {
  public:
@@ -104,7 +108,7 @@ class Observer {
               std::initializer_list<double> row);
 
   robot::RobotModel robot_;
-  dynamics::DriveModel model_;
+  dynamics::DriveModel model_, larger_, smaller_;  // on wheels of double and of half the radius
   double limit_rad_s_;
   Observation seen_;
   std::optional<CellCutter> cells_;

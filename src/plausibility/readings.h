@@ -55,8 +55,12 @@ inline constexpr auto channel_table = std::to_array<Channel>(
      {"motor_temperature", reading::motor_temperature, 2, true, true, "degrees Celsius"},
      {"payload_mass", reading::payload, 1, false, true, "kg"}});
 
+// Stands for a channel in checks of the robot file's wheel radius.
+inline constexpr std::string_view radius_of_file = "wheel_radius_m";
+
 inline std::string_view contract_of(std::string_view channel) {
   if (channel == "utime") return "us since 1970";
+  if (channel == radius_of_file) return "m from the axle to the floor";
   for (const Channel& c : channel_table)
     if (channel.starts_with(c.name)) return c.contract;
   return "";

@@ -209,7 +209,8 @@ class Builder {
 
 }  // namespace
 
-Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s) {
+Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s,
+             double fewest) {
   double n = 0, t = 0, tt = 0, y = 0, ty = 0;
   auto k = static_cast<std::size_t>(std::ranges::lower_bound(time_s, at_s - half_s - 1e-9) - time_s.begin());
   for (; k < time_s.size() && time_s[k] <= at_s + half_s + 1e-9; ++k) {
@@ -218,7 +219,7 @@ Line line_at(std::span<const double> time_s, std::span<const double> v, double a
     ++n, t += u, tt += u * u, y += v[k], ty += u * v[k];
   }
   const double spread = n * tt - t * t;
-  if (n < 3 || !(spread > 0)) return {};
+  if (n < fewest || !(spread > 0)) return {};
   const double slope = (n * ty - t * y) / spread;
   return {(y - slope * t) / n, slope};
 }

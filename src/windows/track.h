@@ -29,11 +29,12 @@ struct Track {
 };
 
 // Straight line through the measured samples within +-half_s of an instant: its value and its slope there;
-// NaN with fewer than three such samples.
+// NaN with fewer than `fewest` such samples.
 struct Line {
   double value = missing, slope = missing;
 };
-Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s);
+Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s,
+             double fewest = 3);
 
 double median_period_s(const telemetry::Recording& mission);
 

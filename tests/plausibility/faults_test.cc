@@ -119,6 +119,27 @@ TEST_F(Faults, WeighsCurrentAgainstWheels) {
   EXPECT_TRUE(explain_faults(all, two).faults.empty());
 }
 
+// A radius of half the robot's moves the map's way by its inverse and the power of acceleration by its
+// inverse square, as wheels that are counted half do, but not the power of friction.
+TEST_F(Faults, WeighsRadiusAgainstWheels) {
+  const auto part = [](double ratio, double radius, double scale) {
+    return heavy_evidence(ratio, {{reading::wheel_velocity, -radius}, {half_radius, -radius}}, scale);
+  };
+  std::vector<ChannelEvidence> all{part(2, 1, 0.2), part(4, 2, 0.2)};
+  std::vector<ChannelFault> two;
+  for (const ChannelFault& f : faults_)
+    if (f.channel == radius_of_file || f.cause == "counted half (0.5 times the motion)") two.push_back(f);
+  ASSERT_EQ(two.size(), 3u);
+  const double none = heavy(2, 0.2) + heavy(4, 0.2), half = 5.5;
+  EXPECT_NEAR(explain_faults(all, two).probability.at(0), 1 / (2 + std::exp(half - none)), 1e-9);
+  all.push_back(heavy_evidence(1, {{reading::wheel_velocity, -2}}, 0.5));
+  const FaultExplanation found = explain_faults(all, two);
+  ASSERT_EQ(found.faults.size(), 1u);
+  EXPECT_EQ(found.faults[0]->id, "wheel_radius_scale");
+  EXPECT_NEAR(found.probability[0], 1 / (1 + std::exp(half - none) + std::exp(-heavy(4, 0.5))), 1e-9);
+  EXPECT_NEAR(measured_factor(all, found, *found.faults[0]).factor, 0.5, 1e-9);
+}
+
 // Factors within a fifth of each other are one fault: km/h for m/s, and feet.
 TEST_F(Faults, AddsNearlyEqualFactors) {
   const std::vector<ChannelEvidence> some{heavy_evidence(1 / 3.6, {{reading::wheel_velocity, -1}}, 0.05),

@@ -6,7 +6,7 @@ namespace joulecast::dynamics {
 
 struct WheelRadiusError {
   static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.5, 0.5, "error of both radii over the nominal one"}});
+      {{"ratio", "1", 0, -0.6, 1.5, "error of both radii over the nominal one"}});
   static constexpr EffectInfo info{
       "wheel_radius_error",
       ActsOn::kinematics,

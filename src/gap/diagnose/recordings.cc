@@ -20,6 +20,7 @@
 #include "gap/verdict/text.h"
 #include "gap/verdict/where.h"
 #include "gap/verdict/words.h"
+#include "plausibility/readings.h"
 
 namespace joulecast::gap {
 namespace {
@@ -32,12 +33,17 @@ constexpr std::size_t ripple_surrogates = 20;
 // Progress of the stages, as parts of the whole.
 constexpr double of_step = 0.1, after_walk = 0.6, after_answer = 0.9;
 
+// A factor of the robot file's wheel radius in all missions.
+bool of_radius(const Check& check) {
+  return check.factor && check.few_missions.empty() && check.channel == plausibility::radius_of_file;
+}
+
 // States that the readings of a contradicted channel were corrected, where its error is known.
 void state_correction(Check& check) {
   if (!check.factor && !check.swapped) return;
   check.contradicted = false;  // any more
   check.says += fmt::format(
-      " The diagnosis uses readings that are {}{}.",
+      " The diagnosis uses {} {}{}.", of_radius(check) ? "the radius" : "readings that are",
       check.swapped ? "exchanged" : fmt::format("divided by this factor, {:.4g}", *check.factor),
       std::isfinite(check.probability) ? " (probability " + probability_text(check.probability) + ")" : "");
 }
@@ -250,27 +256,37 @@ GapSize gap_as_read(const telemetry::RecordingSet& recordings, const robot::Robo
                              : GapSize{missing, missing};
 }
 
-// Adds the delay that checks measured, and that was removed from the readings, to the answer. `as_read`: the
-// gap with it.
-void add_delay(Diagnosis& d, const Check& check, const GapSize& as_read) {
-  constexpr std::string_view id = "sensor_delay";
+// Adds an effect that checks measured, and that was removed before the diagnosis, to the answer. A strength x
+// that the diagnosis found beyond it becomes `added` + x * `times`.
+void add_measured(Diagnosis& d, std::string_view id, const DiagnosedParameter& added, double times,
+                  double probability) {
   auto own = std::ranges::find(d.effects, id, &DiagnosedEffect::id);
   if (own == d.effects.end()) {
     DiagnosedEffect e;
     e.id = id;
-    e.parameters = {{"delay_s", "s", 0, (check.interval[1] - check.interval[0]) / (2 * 1.96)}};
+    e.parameters = {added};
+    e.parameters.front().value = 0;
     e.share = e.power_w = missing;
     own = d.effects.insert(d.effects.end(), std::move(e));
   }
-  own->parameters.front().value += check.value;
-  own->probability = own->group = 1;
+  double& value = own->parameters.front().value;
+  value = added.value + value * times;
+  own->probability = own->group = probability;
   std::erase_if(d.adoptable, [&](const robot::AdoptedEffect& e) { return e.id == id; });
-  d.adoptable.push_back({std::string(id), {{"delay_s", own->parameters.front().value}}});
-  if (d.verdict == Verdict::none) {
-    d.verdict = Verdict::effects;
-    d.verdict_probability = 1;
-    d.refusal.clear();
-  }
+  d.adoptable.push_back({std::string(id), {{added.name, value}}});
+  if (d.verdict != Verdict::none) return;
+  d.verdict = Verdict::effects;
+  d.verdict_probability = probability;
+  d.refusal.clear();
+}
+
+double deviation_of(const Check& check) {
+  return (check.interval[1] - check.interval[0]) / (2 * 1.96);
+}
+
+// `as_read`: the gap with the delay.
+void add_delay(Diagnosis& d, const Check& check, const GapSize& as_read) {
+  add_measured(d, "sensor_delay", {"delay_s", "s", check.value, deviation_of(check)}, 1, 1);
   if (d.power != PowerSource::battery) return;
   if (!d.shrinkage) d.shrinkage.emplace().after = d.power_absolute_relative;
   Shrinkage& s = *d.shrinkage;
@@ -305,17 +321,21 @@ MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::Rec
 
 }  // namespace
 
-std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
+std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, robot::RobotModel& robot) {
   std::vector<Check> checks = plausibility::drop_impossible(recordings, robot);
   std::ranges::move(plausibility::check_recordings(recordings, robot), std::back_inserter(checks));
   silence_contradicted(recordings, checks);
-  std::ranges::for_each(checks, state_correction);
+  for (Check& check : checks) {
+    if (of_radius(check)) robot.kinematics.wheel_radius_m /= *check.factor;
+    state_correction(check);
+  }
   return checks;
 }
 
-Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& file,
                            const Progress& progress) {
   telemetry::RecordingSet trusted = recordings;
+  robot::RobotModel robot = file;
   std::vector<Check> checks = check_and_correct(trusted, robot);
   const auto [electrical_s, battery_s] = measured_delay(checks, trusted);
   GapSize as_read;
@@ -334,6 +354,11 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, progress, checks).run();
   if (!d) return d;
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
+  if (const auto radius = std::ranges::find_if(checks, of_radius); radius != checks.end())
+    add_measured(
+        *d, "wheel_radius_error",
+        {"ratio", "1", 1 / *radius->factor - 1, deviation_of(*radius) / std::pow(*radius->factor, 2)},
+        1 / *radius->factor, radius->probability);
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
     TRY_ASSIGN(const Diagnosis earlier, Diagnoser((*sides)[0], robot, progress, {}).run());

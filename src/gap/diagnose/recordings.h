@@ -7,9 +7,9 @@
 namespace joulecast::gap {
 
 // Takes out readings that the robot cannot have; divides or exchanges those of contradicted channels where
-// the error is known, and sets them to NaN otherwise. Returns the checks, with a sentence on what was
-// corrected.
-std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
+// the error is known, and sets them to NaN otherwise; divides a wrong wheel radius. Returns the checks, with
+// a sentence on what was corrected.
+std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, robot::RobotModel& robot);
 
 // Diagnoses recordings of one robot. Fault::invalid for unusable recordings or a robot file with effects that
 // the catalogue rejects, Fault::conflict when cancelled.

@@ -71,8 +71,9 @@ Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& record
 
 Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
                                       std::span<const std::string> group_of_mission,
-                                      const robot::RobotModel& robot, const Progress& progress) {
+                                      const robot::RobotModel& file, const Progress& progress) {
   Comparison c;
+  robot::RobotModel robot = file;
   std::vector<std::size_t> groups = name_groups(group_of_mission, c);
   if (c.groups.size() < 2)
     return invalid("log", "holds missions of one group only; two are needed to compare");

@@ -99,6 +99,63 @@ std::size_t assign(std::span<Window> windows, std::span<const double> length_s) 
   return blocks;
 }
 
+// Every other sample of a mission's wheel speeds, from the first or the second on.
+struct Half {
+  std::vector<double> time_s;
+  std::array<std::vector<double>, 2> speed;
+
+  Half(const windows::Track& c, std::size_t first) {
+    for (std::size_t k = first; k < c.time_s.size(); k += 2) {
+      time_s.push_back(c.time_s[k]);
+      for (const std::size_t s : {0u, 1u}) speed[s].push_back(c.speed[s][k]);
+    }
+  }
+};
+
+// Replaces the accelerations by those expected given the noise of the speeds. A slope a of longer lines
+// predicts that of the shortest lines by q a, q = sum a1 b2 / sum a a over the rows, each slope times the
+// speed: 1 of one half of the samples, 2 of the other, a of the longer and b of the shortest lines. Noise
+// that is independent from sample to sample is in the denominator alone. Of the lengths, the one that
+// predicts best, a longer one by `clear_gain`.
+void expect_accelerations(std::span<const windows::Track> tracks, std::span<const double> period_s,
+                          PowerRows& rows) {
+  std::vector<std::array<Half, 2>> halves;
+  for (const windows::Track& c : tracks) halves.push_back({Half(c, 0), Half(c, 1)});
+  double most = 0;
+  std::vector<std::array<double, 2>> best;
+  for (const double longer : line_lengths) {
+    std::vector<std::array<double, 2>> slope(rows.instants.size());
+    double product = 0, square = 0;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      for (const std::size_t s : {0u, 1u}) {
+        double whole = 0, first = 0, second = 0, speed = 0;
+        for (std::size_t k = rows.first[r]; k < rows.first[r + 1]; ++k) {
+          const Window& w = rows.instants[k];
+          const windows::Track& c = tracks[w.mission];
+          const auto& [one, two] = halves[w.mission];
+          const double half_s = std::max(line_s, line_rows * period_s[w.mission]);
+          slope[k][s] = windows::line_at(c.time_s, c.speed[s], w.t_s, longer * half_s).slope;
+          whole += slope[k][s];
+          first += windows::line_at(one.time_s, one.speed[s], w.t_s, longer * half_s, 2).slope;
+          second += windows::line_at(two.time_s, two.speed[s], w.t_s, half_s, 2).slope;
+          speed += w.speed_rad_s[s];
+        }
+        if (!std::isfinite(speed * whole * first * second)) continue;
+        product += speed * speed * first * second;
+        square += speed * speed * whole * whole;
+      }
+    }
+    if (!(product > 0) || product * product / square <= (1 + clear_gain) * most) continue;
+    most = product * product / square;
+    for (auto& of : slope)
+      for (double& a : of) a *= product / square;
+    best = std::move(slope);
+  }
+  for (std::size_t k = 0; k < best.size(); ++k)
+    for (const std::size_t s : {0u, 1u})
+      if (std::isfinite(best[k][s])) rows.instants[k].acceleration_rad_s2[s] = best[k][s];
+}
+
 // Windows with a measured power, as rows of one instant.
 PowerRows rows_of(std::span<const Window> windows, std::span<const double> power_w) {
   PowerRows rows;
@@ -137,14 +194,14 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.voltages = !d.motors &&
                share([](const Window& w) { return std::isfinite(w.voltage_v[0] + w.voltage_v[1]); }) > few;
 
-  std::vector<double> length_s, voltage_v;
+  std::vector<double> length_s, voltage_v, period_s;
   std::vector<windows::Track> tracks;
   double total_s = 0;
   for (const telemetry::Recording& mission : missions) {
     length_s.push_back(telemetry::length_s(mission));
     total_s += length_s.back();
-    tracks.push_back(
-        windows::make_track(mission, robot, d.covariates, windows::median_period_s(mission), {}));
+    period_s.push_back(windows::median_period_s(mission));
+    tracks.push_back(windows::make_track(mission, robot, d.covariates, period_s.back(), {}));
     const double mean_v = tracks.back().mean_battery_voltage_v;
     voltage_v.push_back(std::isfinite(mean_v) ? mean_v : robot.battery.nominal_voltage_v);
   }
@@ -157,8 +214,9 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     d.rows = rows_of(d.windows, measured_power(d.windows, robot));
   } else {
     for (std::size_t m = 0; m < missions.size(); ++m)
-      add_readings(tracks[m], windows::median_period_s(missions[m]), voltage_v[m], m,
-                   total_s / static_cast<double>(most_power_rows), d.rows);
+      add_readings(tracks[m], period_s[m], voltage_v[m], m, total_s / static_cast<double>(most_power_rows),
+                   d.rows);
+    expect_accelerations(tracks, period_s, d.rows);
     d.blocks = assign(d.rows.instants, length_s);
   }
   d.power = d.rows.size() >= fewest_rows;

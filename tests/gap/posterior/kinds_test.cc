@@ -173,14 +173,11 @@ TEST(OutsideCatalogue, ColdGreaseFollowsTime) {
   EXPECT_EQ(a->outside.follows, "time");
 }
 
-// A pose that moves 0.9 times as far as the wheels of the file, with battery power.
-TEST(WheelRadius, IsFoundByPose) {
-  Drives drives(28);
-  drives.planted = {effect_of("wheel_radius_error", -0.1)};
-  telemetry::RecordingSet recordings = drives.recordings();
+// Adds the poses of a robot on wheels `times` as large as the file's.
+void add_poses(double times, const robot::RobotModel& robot, telemetry::RecordingSet& recordings) {
   std::mt19937_64 random(28);
   std::normal_distribution<double> noise(0, 0.003);
-  const double r = 0.9 * drives.robot.kinematics.wheel_radius_m, l = drives.robot.kinematics.half_track_m;
+  const double r = times * robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
   for (telemetry::Recording& mission : recordings.missions) {
     std::array<double, 3> pose{};
     for (signals::Sample& s : mission.samples) {
@@ -191,6 +188,14 @@ TEST(WheelRadius, IsFoundByPose) {
       for (const std::size_t k : {0u, 1u, 2u}) s.pose[k] = pose[k] + noise(random);
     }
   }
+}
+
+// A pose that moves 0.9 times as far as the wheels of the file, with battery power.
+TEST(WheelRadius, IsFoundByPose) {
+  Drives drives(28);
+  drives.planted = {effect_of("wheel_radius_error", -0.1)};
+  telemetry::RecordingSet recordings = drives.recordings();
+  add_poses(0.9, drives.robot, recordings);
   const auto a = explain_recordings(recordings, drives.robot);
   ASSERT_TRUE(a);
   const auto radius = std::ranges::find(a->effects, "wheel_radius_error", &ExplainedBy::id);
@@ -198,6 +203,28 @@ TEST(WheelRadius, IsFoundByPose) {
   EXPECT_GT(radius->group, 0.9);
   EXPECT_NEAR(radius->parameters.front().value, -0.1, 0.02);
   EXPECT_FALSE(names(*a, "linear_inertia_error"));
+}
+
+// The file holds half the radius: with poses the robot is known, without them mass and radius have one
+// effect.
+TEST(WheelRadius, HalfOfItIsNoMass) {
+  Drives drives(33);
+  telemetry::RecordingSet recordings = drives.recordings();
+  robot::RobotModel file = drives.robot;
+  file.kinematics.wheel_radius_m /= 2;
+  const auto by_power = diagnose(recordings, file, {});
+  ASSERT_TRUE(by_power);
+  for (const DiagnosedEffect& e : by_power->effects) EXPECT_LT(e.probability, 0.9) << e.id;
+  EXPECT_EQ(std::ranges::count(by_power->checks, "wheel_radius_scale", &Check::id), 1);
+  add_poses(2, file, recordings);
+  const auto d = diagnose(recordings, file, {});
+  ASSERT_TRUE(d);
+  const auto corrected = take(offer_of(*d), file);
+  ASSERT_TRUE(corrected) << describe(corrected.error());
+  EXPECT_EQ(std::ranges::count(d->checks, "track_against_gyro", &Check::id), 0);
+  const auto p = dynamics::drive_model(*corrected)->parameters();
+  EXPECT_NEAR(p.wheel_radius_m[0] / drives.robot.kinematics.wheel_radius_m, 1, 0.01);
+  EXPECT_NEAR(p.friction_torque_nm[0] / file.motor.friction_torque_nm[0], 1, 0.05);
 }
 
 // Acceleration is the derivative of a speed that only noise changes.
@@ -222,6 +249,26 @@ TEST(NoisySpeed, MassStaysUnknown) {
   const auto a = explain_recordings(recordings, heavy);
   ASSERT_TRUE(a);
   EXPECT_FALSE(names(*a, "chassis_mass_error"));
+}
+
+// Noise of the speeds that is about as large in the acceleration as the motion's own. A regression of the
+// power on that of one more kilogram finds the file's mass to be right.
+TEST(NoisySpeed, MassIsNotAttenuated) {
+  Drives drives(34);
+  telemetry::RecordingSet recordings = drives.recordings();
+  std::mt19937_64 random(34);
+  std::normal_distribution<double> noise(0, 2);
+  for (telemetry::Recording& mission : recordings.missions)
+    for (signals::Sample& s : mission.samples)
+      for (double& speed : s.wheel_velocity_rad_s) speed += noise(random);
+  const auto data = make_data(recordings.missions, drives.robot);
+  ASSERT_TRUE(data);
+  const Eigen::VectorXd own_w = predicted_power(*data, {}), left_w = data->rows.measured_w() - own_w,
+                        per_kg =
+                            predicted_power(*data, std::vector{effect_of("chassis_mass_error", 0.1)}) - own_w;
+  const Eigen::ArrayXd x = per_kg.array() - per_kg.mean();
+  const double share = 0.1 * (x * left_w.array()).sum() / x.square().sum();
+  EXPECT_NEAR(share, 0, 0.1);
 }
 
 struct Offer {
