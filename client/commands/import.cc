@@ -212,12 +212,14 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
               {"samples", "samples", 0},
               {"dropped", "rows_dropped", 0},
               {"glitches", "", 0, 1, [](const Json& r) { return std::to_string(r["glitches"].size()); }}});
+  for (const Json& warning : document["warnings"]) fmt::print("{}\n", warning.get<std::string>());
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
     const telemetry::ImportReport& report = one.report;
     for (const std::string& note : report.notes) fmt::print("{}: {}\n", one.table, note);
     for (const auto& [count, says] :
-         {std::pair(report.rows_unsorted, "rows were out of order and are sorted by time"),
+         {std::pair(report.rows_without_motion, "rows lack a wheel speed and are skipped"),
+          std::pair(report.rows_unsorted, "rows were out of order and are sorted by time"),
           std::pair(report.rows_out_of_time, "rows repeat the time of another row and are skipped")})
       if (count > 0) fmt::print("{}: {} {}\n", one.table, count, says);
     for (const telemetry::JoinReport& join : report.joins)
@@ -256,7 +258,12 @@ Result<Exit> run_import(ImportOptions& options) {
       for (const std::string& line : source.lines) fmt::print("{}: {}\n", source.shown, line);
   TRY_ASSIGN(const auto all, import_all(options, sources));
   TRY(write_log(options, all));
-  Json document{{"log", options.out}, {"recordings", Json::array()}};
+  Json document{{"log", options.out}, {"recordings", Json::array()}, {"warnings", Json::array()}};
+  if (bags == 0) {
+    TRY_ASSIGN(const auto mapping, read_mapping(options.mapping));
+    for (const auto& [field, says] : telemetry::suspicious(mapping))
+      document["warnings"].push_back(options.mapping + "#" + field + " " + says);
+  }
   for (const Imported& one : all) document["recordings"].push_back(to_json(one));
   for (const ImportSource& source : sources)
     if (!source.lines.empty())

@@ -116,7 +116,8 @@ Schema findings_schema() {
                 {{"verdict",
                   with_words(
                       {{"enum", {"as_declared", "undeclared", "inseparable"}}},
-                      "inseparable: payload is not distinguished from friction and slope by this motion")},
+                      "inseparable: payload is not distinguished from friction and slope by this motion, "
+                      "or the file's mass is greater than that of the robot")},
                  {"declared_kg", number("mean over the mission")},
                  {"undeclared_kg", number("estimated payload beyond the declared one")},
                  {"undeclared_sd_kg", number("standard deviation, including the uncertainty of friction, "

@@ -4,6 +4,7 @@
 
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -79,9 +80,20 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
   ++judged_;
   if (learn) learned_from_.push_back(mission.key);
   while (learned_from_.size() > refinement_.missions()) learned_from_.pop_front();
-  const char* verdict = finding.inseparable  ? "inseparable"
-                        : finding.undeclared ? "undeclared"
-                                             : "as_declared";
+  if (!finding.inseparable && finding.undeclared_kg.sd > 0) {
+    const double weight = 1 / (finding.undeclared_kg.sd * finding.undeclared_kg.sd);
+    const double carried_kg = declared_kg + finding.undeclared_kg.value;
+    const std::array<double, 5> terms{1, declared_kg, carried_kg, declared_kg * declared_kg,
+                                      declared_kg * carried_kg};
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      payload_sums_[k] = payload_memory * payload_sums_[k] + weight * terms[k];
+  }
+  const PayloadLine line = payload_line();
+  // Less than nothing is an error of the file.
+  const bool inseparable =
+      finding.inseparable ||
+      (finding.undeclared && line.unloaded_kg < -least_significance * line.unloaded_sd_kg);
+  const char* verdict = inseparable ? "inseparable" : finding.undeclared ? "undeclared" : "as_declared";
   const Json payload{{"verdict", verdict},
                      {"declared_kg", declared_kg},
                      {"undeclared_kg", finding.undeclared_kg.value},
@@ -97,33 +109,32 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
     document["parameters"][std::string(energy::unknown_names[k])] = {
         {"value", finding.parameters[k].value}, {"sd", finding.parameters[k].sd}, {"in_force", in_force[k]}};
   out.findings_json = document.dump();
-  if (finding.undeclared && !finding.inseparable) {
+  if (finding.undeclared && !inseparable) {
     Json event = payload;
     event["mission"] = mission.key;
     event["mission_id"] = mission.mission_id;
     out.payload_event_json = event.dump(-1, ' ', false, Json::error_handler_t::replace);
   }
-  if (!finding.inseparable && finding.undeclared_kg.sd > 0) {
-    const double weight = 1 / (finding.undeclared_kg.sd * finding.undeclared_kg.sd);
-    const double carried_kg = declared_kg + finding.undeclared_kg.value;
-    const std::array<double, 5> terms{1, declared_kg, carried_kg, declared_kg * declared_kg,
-                                      declared_kg * carried_kg};
-    for (std::size_t k = 0; k < terms.size(); ++k)
-      payload_sums_[k] = payload_memory * payload_sums_[k] + weight * terms[k];
-  }
-  out.payload_unit = payload_unit();
+  out.payload_unit = payload_unit(line);
   return out;
 }
 
-// Whether the carried payload grows with the declared one as pounds do, and not as kilograms. Load that is
-// carried always is the constant of the line.
-std::optional<Contradiction> RefinementWatch::payload_unit() const {
+RefinementWatch::PayloadLine RefinementWatch::payload_line() const {
   const auto [w, x, y, xx, xy] = payload_sums_;
   const double spread = xx - x * x / w;
-  if (!(spread > 1e-9 * xx)) return std::nullopt;  // one declared payload
+  // Of one declared payload: the unloaded robot carries this at most.
+  if (!(spread > 1e-9 * xx)) return {0, std::numeric_limits<double>::infinity(), y / w, 1 / std::sqrt(w)};
   const double slope = (xy - x * y / w) / spread, sd = 1 / std::sqrt(spread);
+  return {slope, sd, (y - slope * x) / w, std::sqrt(1 / w + x * x / (w * w * spread))};
+}
+
+// Whether the carried payload grows with the declared one as pounds do, and not as kilograms, while the file
+// explains the unloaded robot.
+std::optional<Contradiction> RefinementWatch::payload_unit(const PayloadLine& line) {
+  const auto& [slope, sd, unloaded_kg, unloaded_sd_kg] = line;
   if (1 - slope < payload_certain * sd || sd > (1 - pound_kg) / payload_certain ||
-      std::abs(slope - pound_kg) > payload_certain * sd)
+      std::abs(slope - pound_kg) > payload_certain * sd ||
+      std::abs(unloaded_kg) > least_significance * unloaded_sd_kg)
     return std::nullopt;
   Contradiction c;
   c.kind = ContradictionKind::scale;

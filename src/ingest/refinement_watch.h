@@ -52,7 +52,12 @@ class RefinementWatch {
   void recall(const std::string& text);  // text that is no memory changes nothing
 
  private:
-  std::optional<Contradiction> payload_unit() const;
+  // The carried payload over the declared one, and that of an unloaded robot.
+  struct PayloadLine {
+    double slope, slope_sd, unloaded_kg, unloaded_sd_kg;
+  };
+  PayloadLine payload_line() const;
+  static std::optional<Contradiction> payload_unit(const PayloadLine& line);
   void begin_tests() { tests_ = 0, tested_at_ = 0; }
 
   robot::RobotModel robot_;

@@ -1,5 +1,10 @@
 #include "telemetry/import_mapping.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -133,6 +138,23 @@ ImportMapping read_mapping(const Json& v, Faults& faults) {
   return content;
 }
 
+// The text in brackets at the end of a column's name, as in "speed [km/h]", if it is short enough for a unit.
+std::string_view unit_of(std::string_view column) {
+  const std::size_t open = column.find_last_of("[("), close = column.find_last_of("])");
+  if (open == column.npos || close != column.size() - 1 || close < open) return {};
+  const std::string_view text = column.substr(open + 1, close - open - 1);
+  const auto is_letter = [](unsigned char c) { return std::isalpha(c) != 0; };
+  return text.size() > 3 && std::ranges::all_of(text, is_letter) ? std::string_view() : text;
+}
+
+// Whether the name of a channel ends with the unit, as yaw_rate_rad_s does with rad/s.
+bool is_in(std::string_view unit, std::string_view channel) {
+  std::string suffix = "_";
+  for (const unsigned char c : unit)
+    if (c == '/' || std::isalnum(c) != 0) suffix += c == '/' ? '_' : static_cast<char>(std::tolower(c));
+  return channel.ends_with(suffix);
+}
+
 }  // namespace
 
 Result<ImportMapping> ImportMapping::parse(std::string_view text) {
@@ -174,6 +196,17 @@ std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
          name == "battery_voltage"
              ? "is a constant: power is computed with it, but the voltage itself has no information"
              : "is a constant, not a measurement: leave it out"});
+  }
+  for (const auto& [name, e, number] : mapping.targets) {
+    if (e.combine == Combine::quaternion_yaw || !e.over.empty() || e.rate_window_s) continue;
+    for (const ColumnTerm& term : e.terms) {
+      const std::string_view unit = unit_of(term.column), channel = signals::sample_fields[number].key;
+      if (unit.empty() || is_in(unit, channel) || std::fabs(term.scale * e.scale / e.divide_by) != 1)
+        continue;
+      found.push_back(
+          {"/fields/" + name, fmt::format("column \"{}\" is read as {} without a scale: is its unit {}?",
+                                          term.column, channel, unit)});
+    }
   }
   for (const std::string field : {"wheel_velocity", "motor_voltage", "motor_current"}) {
     if (!given.contains(field + "[0]") || !given.contains(field + "[1]")) continue;

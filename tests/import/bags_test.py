@@ -465,6 +465,9 @@ class Bags(unittest.TestCase):
             self.assertAlmostEqual(mission["energy"]["battery_j"] / self.original["battery_j"], 1, delta=1e-6)
         numbers = [struct.unpack_from(">q", body, 16)[0] for _, body in telemetry_of(log)]
         self.assertEqual(numbers, list(range(2 * len(self.samples))))
+        path = self.place / "drive.mcap"
+        path.write_bytes(path.read_bytes()[:-8])
+        self.assertIn("ends before its footer", self.bring(path)[1])
 
     def test_several_drives_are_missions(self):
         later = [{**s, "utime": s["utime"] + 600 * 10**6} for s in self.samples]
@@ -482,6 +485,17 @@ class Bags(unittest.TestCase):
         log, text = self.bring(path)
         self.assertIn("ends before its footer", text)
         self.assertGreater(len(samples_of(log)), len(self.samples) // 3)
+
+    def test_undecodable_messages_are_left_out(self):
+        path = self.place / "truncated.db3"
+        write_db3(path, Drive(self.samples).all(), "memory")
+        with sqlite3.connect(path) as bag:
+            bag.execute("UPDATE messages SET data = substr(data, 1, 40) WHERE id IN (SELECT messages.id FROM messages "
+                        "JOIN topics ON topics.id = topic_id WHERE type LIKE '%JointState' LIMIT 2 OFFSET 100)")
+        bag.close()
+        log, text = self.bring(path)
+        self.assertIn("messages that cannot be decoded are left out", text)
+        self.assertEqual(len(samples_of(log)), len(self.samples) - 2)
 
     def test_unusable_files_are_named(self):
         path = self.place / "empty.bag"

@@ -422,6 +422,45 @@ TEST(RobotWithoutFile, IsShownWithoutModel) {
   EXPECT_GT(shown->faults.at("unknown_robot"), 0u);
 }
 
+// Returns the declared payloads.
+std::set<double> drive_missions(testing::PipelineHarness& harness, const made::Robot& robot) {
+  std::set<double> declared;
+  for (const telemetry::Recording& mission : robot.recordings.missions) {
+    declared.insert(mission.payload_kg);
+    const auto event = [&](signals::MissionPhase phase, std::int64_t at_us) {
+      harness.pipeline->handle(
+          {robot.model.robot_id,
+           signals::MissionEvent{at_us, mission.mission_id, phase, mission.payload_kg, ""}, at_us});
+    };
+    event(signals::MissionPhase::started, mission.samples.front().utime_us - 1000);
+    for (const Sample& s : mission.samples) harness.pipeline->handle({robot.model.robot_id, s, s.utime_us});
+    event(signals::MissionPhase::finished, mission.samples.back().utime_us + 1000);
+    harness.pipeline->tick(mission.samples.back().utime_us + 1'000'000);
+  }
+  harness.pipeline->publish();
+  return declared;
+}
+
+// By a file with these factors of wheel radius and mass the unloaded robot weighs less than nothing.
+TEST(WrongFile, ClaimsNothingAboutPayloads) {
+  const made::Robot amr = made::virtual_robot("amr", 41, [](auto&spec) { spec.missions = 6; }),
+                    nomad = made::virtual_robot("nomad", 45, [](auto&spec) { spec.missions = 6; });
+  for (const made::Robot& robot : {amr, nomad})
+    for (const auto& [radius, mass] : {std::pair{1.3, 0.8}, {1.3, 1.25}, {1.48, 1.0}}) {
+      robot::RobotModel wrong = robot.model;
+      wrong.kinematics.wheel_radius_m *= radius;
+      wrong.mass.chassis_kg *= mass;
+      testing::PipelineHarness harness;
+      harness.add_robot(wrong);
+      drive_missions(harness, robot);
+      for (const auto& c : harness.fleet.find(wrong.robot_id)->contradictions)
+        EXPECT_NE(c.id, "payload_scale") << c.says;
+      const auto events = *harness.store->events(0, 100);
+      for (const history::Event& event : events)
+        EXPECT_NE(event.kind, "undeclared_payload") << event.detail_json;
+    }
+}
+
 // A manifest in pounds that is declared in kilograms.
 TEST(PayloadInPounds, IsNamedWithinTenMissions) {
   for (const bool pounds : {true, false})
@@ -435,22 +474,7 @@ TEST(PayloadInPounds, IsNamedWithinTenMissions) {
           });
       testing::PipelineHarness harness;
       harness.add_robot(robot.model);
-      std::set<double> declared;
-      for (const telemetry::Recording& mission : robot.recordings.missions) {
-        declared.insert(mission.payload_kg);
-        const auto event = [&](signals::MissionPhase phase, std::int64_t at_us) {
-          harness.pipeline->handle(
-              {robot.model.robot_id,
-               signals::MissionEvent{at_us, mission.mission_id, phase, mission.payload_kg, ""}, at_us});
-        };
-        event(signals::MissionPhase::started, mission.samples.front().utime_us - 1000);
-        for (const Sample& s : mission.samples)
-          harness.pipeline->handle({robot.model.robot_id, s, s.utime_us});
-        event(signals::MissionPhase::finished, mission.samples.back().utime_us + 1000);
-        harness.pipeline->tick(mission.samples.back().utime_us + 1'000'000);
-      }
-      harness.pipeline->publish();
-      EXPECT_GE(declared.size(), 2u);
+      EXPECT_GE(drive_missions(harness, robot).size(), 2u);
       const auto contradictions = harness.fleet.find(robot.model.robot_id)->contradictions;
       const auto found = std::ranges::find(contradictions, "payload_scale", &ingest::Contradiction::id);
       ASSERT_EQ(found != contradictions.end(), pounds) << seed;

@@ -918,6 +918,21 @@ TEST(ImportMapping, ReportsEveryFaultAndWarning) {
               ::testing::ElementsAre("/fields/battery_voltage"));
 }
 
+TEST(ImportMapping, WarnsOfUnitsInHeaders) {
+  const auto warned = [](const std::string& column, const std::string& more = "") {
+    return suspicious(
+               mapping_of(
+                   "",
+                   ", \"battery_voltage\": {\"column\": \"U [V]\"}, \"battery_current\": {\"column\": \"" +
+                       column + "\"" + more + "}"))
+        .size();
+  };
+  for (const char* own : {"I [A]", "I (a)", "I (battery)", "[x] I"}) EXPECT_EQ(warned(own), 0u) << own;
+  EXPECT_EQ(warned("I [mA]", ", \"scale\": 0.001"), 0u);
+  for (const char* other : {"I [mA]", "I (mA)", "I [km/h]", "I [%]"}) EXPECT_EQ(warned(other), 1u) << other;
+  EXPECT_EQ(warned("I [mA]", ", \"negate\": true"), 1u);
+}
+
 TEST(ImportMapping, FaultsNameMember) {
   EXPECT_EQ(mapping_fault("{"), "");
   EXPECT_EQ(mapping_fault(mapping_text(R"("robt_id": 1, )")), "/robt_id");

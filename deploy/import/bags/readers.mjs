@@ -46,7 +46,7 @@ async function readMcap(file, bag) {
     if (record.type !== 'Message') return;
     const { topic, type, decoder } = channels.get(record.channelId);
     bag.see(topic, type, 1);
-    if (decoder) bag.put(topic, type, Number(record.logTime) / 1e3, decoder.readMessage(record.data));
+    if (decoder) bag.put(topic, Number(record.logTime) / 1e3, () => decoder.readMessage(record.data));
   };
   try {
     for await (const data of createReadStream(file, { highWaterMark: 1 << 22 })) {
@@ -76,7 +76,7 @@ async function readRos1(file, bag) {
   const topics = [...types.keys()].filter((topic) => bag.wants(types.get(topic)));
   if (topics.length > 0)
     for await (const { topic, timestamp, message } of recording.messageIterator({ topics }))
-      bag.put(topic, types.get(topic), usOf(timestamp), message);
+      bag.put(topic, usOf(timestamp), () => message);
   await reader.close();
 }
 
@@ -97,15 +97,15 @@ async function readSqlite(file, bag) {
     for (const [id, name, type, count] of db.exec(sql)[0]?.values ?? []) {
       bag.see(name, type, count);
       const decoder = bag.wants(type) ? shippedDecoder(type) : undefined;
-      if (decoder) topics.set(id, { name, type, decoder });
+      if (decoder) topics.set(id, { name, decoder });
     }
     const statement = db.prepare(
       `SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN (${[...topics.keys()]}) ORDER BY timestamp`,
     );
     while (statement.step()) {
       const [id, timestamp, message] = statement.get(null, { useBigInt: true });
-      const { name, type, decoder } = topics.get(Number(id));
-      bag.put(name, type, Number(timestamp) / 1e3, decoder.readMessage(message));
+      const { name, decoder } = topics.get(Number(id));
+      bag.put(name, Number(timestamp) / 1e3, () => decoder.readMessage(message));
     }
   } catch (error) {
     const repair = `\`sqlite3 ${file} .recover | sqlite3 new.db3\` reads what is left`;

@@ -104,8 +104,17 @@ export class Recording {
   warn(text) {
     this.warnings.push(text);
   }
-  put(name, _type, receiptUs, message) {
+  // `decode` returns the message; one that it cannot read is left out.
+  put(name, receiptUs, decode) {
     const topic = this.topics.get(name);
+    let message;
+    try {
+      message = decode();
+    } catch (error) {
+      const text = `${name}: messages that cannot be decoded are left out (${error.message})`;
+      if (!this.warnings.includes(text)) this.warn(text);
+      return;
+    }
     for (const part of message.transforms ?? [message]) {
       const { sec, nsec, nanosec } = part.header?.stamp ?? { sec: 0, nsec: 0 };
       const stampUs = sec * 1e6 + (nsec ?? nanosec) / 1e3;
@@ -148,6 +157,7 @@ export class Recording {
         );
         part.see(name, type, kept.length).rows = kept;
       }
+      part.warnings.push(...(k > 0 ? [] : this.warnings));
       if (k > 0) part.warn('the clock of the wheels starts again: a new mission begins');
       return part;
     });
