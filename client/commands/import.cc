@@ -139,8 +139,10 @@ class ConvertedBags : boost::noncopyable {
   std::string folder_ = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
 };
 
+using Mappings = std::map<std::string, telemetry::ImportMapping>;  // by path
+
 Result<std::vector<Imported>> import_all(const ImportOptions& options,
-                                         const std::vector<ImportSource>& sources) {
+                                         const std::vector<ImportSource>& sources, const Mappings& mappings) {
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   how.start_utime_us = options.start_utime_us;
@@ -148,13 +150,9 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   std::vector<Imported> all;
   Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
-  std::map<std::string, telemetry::ImportMapping> mappings;
   for (const ImportSource& source : sources) {
     progress.reach(done++);
-    if (!mappings.contains(source.mapping)) {
-      TRY_ASSIGN(mappings[source.mapping], read_mapping(source.mapping));
-    }
-    auto missions = import_table(source.table, mappings[source.mapping], how);
+    auto missions = import_table(source.table, mappings.at(source.mapping), how);
     if (!missions) {
       Error error = std::move(missions.error());
       if (error.field.starts_with(source.table)) error.field.replace(0, source.table.size(), source.shown);
@@ -256,14 +254,17 @@ Result<Exit> run_import(ImportOptions& options) {
   if (!options.json)
     for (const ImportSource& source : sources)
       for (const std::string& line : source.lines) fmt::print("{}: {}\n", source.shown, line);
-  TRY_ASSIGN(const auto all, import_all(options, sources));
+  Mappings mappings;
+  for (const ImportSource& source : sources)
+    if (!mappings.contains(source.mapping)) {
+      TRY_ASSIGN(mappings[source.mapping], read_mapping(source.mapping));
+    }
+  TRY_ASSIGN(const auto all, import_all(options, sources, mappings));
   TRY(write_log(options, all));
   Json document{{"log", options.out}, {"recordings", Json::array()}, {"warnings", Json::array()}};
-  if (bags == 0) {
-    TRY_ASSIGN(const auto mapping, read_mapping(options.mapping));
-    for (const auto& [field, says] : telemetry::suspicious(mapping))
+  if (bags == 0)
+    for (const auto& [field, says] : telemetry::suspicious(mappings.at(options.mapping)))
       document["warnings"].push_back(options.mapping + "#" + field + " " + says);
-  }
   for (const Imported& one : all) document["recordings"].push_back(to_json(one));
   for (const ImportSource& source : sources)
     if (!source.lines.empty())

@@ -14,9 +14,14 @@ namespace {
 
 constexpr double few = 0.2;  // of the windows: a channel with fewer readings is not used
 
+// Half of the line about a reading.
+double half_line_s(double period_s) {
+  return std::max(line_s, line_rows * period_s);
+}
+
 // The motion at one sample.
 Window instant_at(const windows::Track& c, std::size_t k, double period_s) {
-  const double half_s = std::max(line_s, line_rows * period_s);
+  const double half_s = half_line_s(period_s);
   Window w;
   w.t_s = c.time_s[k];
   w.length_s = period_s;
@@ -117,8 +122,7 @@ struct Half {
 // speed: 1 of one half of the samples, 2 of the other, a of the longer and b of the shortest lines. Noise
 // that is independent from sample to sample is in the denominator alone. Of the lengths, the one that
 // predicts best, a longer one by `clear_gain`.
-void expect_accelerations(std::span<const windows::Track> tracks, std::span<const double> period_s,
-                          PowerRows& rows) {
+void expect_accelerations(std::span<const windows::Track> tracks, PowerRows& rows) {
   std::vector<std::array<Half, 2>> halves;
   for (const windows::Track& c : tracks) halves.push_back({Half(c, 0), Half(c, 1)});
   double most = 0;
@@ -133,7 +137,7 @@ void expect_accelerations(std::span<const windows::Track> tracks, std::span<cons
           const Window& w = rows.instants[k];
           const windows::Track& c = tracks[w.mission];
           const auto& [one, two] = halves[w.mission];
-          const double half_s = std::max(line_s, line_rows * period_s[w.mission]);
+          const double half_s = half_line_s(w.length_s);
           slope[k][s] = windows::line_at(c.time_s, c.speed[s], w.t_s, longer * half_s).slope;
           whole += slope[k][s];
           first += windows::line_at(one.time_s, one.speed[s], w.t_s, longer * half_s, 2).slope;
@@ -216,7 +220,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     for (std::size_t m = 0; m < missions.size(); ++m)
       add_readings(tracks[m], period_s[m], voltage_v[m], m, total_s / static_cast<double>(most_power_rows),
                    d.rows);
-    expect_accelerations(tracks, period_s, d.rows);
+    expect_accelerations(tracks, d.rows);
     d.blocks = assign(d.rows.instants, length_s);
   }
   d.power = d.rows.size() >= fewest_rows;
