@@ -1,6 +1,7 @@
 #include "telemetry/stamp.h"
 
 #include <date/tz.h>
+#include <re2/re2.h>
 
 #include <algorithm>
 #include <array>
@@ -8,7 +9,6 @@
 #include <chrono>
 #include <ctime>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "base/utc_time.h"
@@ -20,16 +20,11 @@ using std::chrono::microseconds;
 using std::chrono::minutes;
 using LocalTime = date::local_time<microseconds>;
 
-constexpr std::string_view digits = "0123456789";
 constexpr std::string_view accepted_stamps =
     "; accepted are ISO 8601 (2026-03-01T08:00:00.25Z) and the like, 01.03.2026 08:00:00, 1 Mar 2026 "
     "08:00:00, a time of day (08:00:00), or the form that \"format\" gives (%d/%m/%Y %H:%M:%S)";
 constexpr std::string_view doubtful =
     "is no time: day, month or year may be first; \"format\" decides (%d/%m/%Y %H:%M:%S)";
-
-bool all_digits(std::string_view text) {
-  return text.find_first_not_of(digits) == std::string_view::npos;
-}
 
 // `text` has no fraction of a second.
 std::optional<LocalTime> parse_stamp(const std::string& text, const std::string& form) {
@@ -46,91 +41,56 @@ std::optional<LocalTime> parse_stamp(const std::string& text, const std::string&
 
 // Takes the zone off the end: Z, UTC, GMT, +01, +0100, +01:00, +0000 UTC.
 std::optional<minutes> take_offset(std::string& text) {
-  for (const std::string_view name : {"Z", "z", "UTC", "GMT"})
-    if (text.ends_with(name) && text.size() > name.size()) {
-      text.resize(text.find_last_not_of(' ', text.size() - name.size() - 1) + 1);
-      return take_offset(text).value_or(minutes(0));
-    }
-  const std::size_t sign = text.find_last_of("+-");
-  if (sign == std::string::npos || text.find_first_of(":T") > sign) return std::nullopt;
-  std::string number = text.substr(sign + 1);
-  if (number.size() == 5 && number[2] == ':') number.erase(2, 1);
-  if ((number.size() != 2 && number.size() != 4) || !all_digits(number)) return std::nullopt;
-  const int value = std::stoi(number.size() == 2 ? number + "00" : number);
-  if (value > 1400 || value % 100 > 59) return std::nullopt;
+  static const RE2 name("(.+?)(?: *(?:Z|z|UTC|GMT))+"), number(R"((.*[:T].*)([-+])(\d\d)(?::?(\d\d))?)");
+  std::string before, sign, hour, minute;
+  const bool named = RE2::FullMatch(text, name, &before);
+  if (named) text = before;
+  const bool numbered = RE2::FullMatch(text, number, &before, &sign, &hour, &minute);
+  const int value = numbered ? std::stoi(hour + (minute.empty() ? "00" : minute)) : 0;
+  if (!numbered || value > 1400 || value % 100 > 59) return named ? std::optional(minutes(0)) : std::nullopt;
+  text = before;
   const minutes offset(value / 100 * 60 + value % 100);
-  const minutes east = text[sign] == '+' ? offset : -offset;
-  text.resize(sign);
-  return east;
+  return sign == "+" ? offset : -offset;
 }
 
-microseconds fraction_of(std::string_view part) {
-  std::string number(part);
+microseconds fraction_of(std::string number) {
   number.resize(6, '0');
   return microseconds(std::stol(number));
 }
 
 // Takes the fraction behind the last point off, where a time of day is before it.
 microseconds take_fraction(std::string& text) {
-  const std::size_t point = text.rfind('.');
-  const std::size_t time = text.find_first_of(": ");
-  if (point == std::string::npos || time == std::string::npos || time > point) return microseconds(0);
-  const std::size_t end = std::min(text.find_first_not_of(digits, point + 1), text.size());
-  const microseconds fraction = fraction_of(std::string_view(text).substr(point + 1, end - point - 1));
-  text.erase(point, end - point);
-  return fraction;
+  static const RE2 form(R"((.*[: ].*)\.(\d*)([^.]*))");
+  std::string before, number, behind;
+  if (!RE2::FullMatch(text, form, &before, &number, &behind)) return microseconds(0);
+  text = before + behind;
+  return fraction_of(number);
 }
 
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-
-// Takes digits off the front; empty where there are none or more than `most`.
-std::optional<int> take_number(std::string_view& text, std::size_t most) {
-  const std::size_t end = std::min(text.find_first_not_of(digits), text.size());
-  if (end == 0 || end > most) return std::nullopt;
-  const int value = std::stoi(std::string(text.substr(0, end)));
-  text.remove_prefix(end);
-  return value;
+std::optional<microseconds> time_of(int hour, int minute, int second, const std::string& fraction) {
+  if (hour > 24 || minute > 59 || second > 60) return std::nullopt;
+  return std::chrono::hours(hour) + minutes(minute) + std::chrono::seconds(second) + fraction_of(fraction);
 }
 
 // Takes a time of day out of a stamp: 8:00, 08:00:00.25, 8:00:00 PM; minutes and a fraction of a second,
-// 00:59.5. After a blank, points or dashes may divide it. Empty where there is none.
-std::optional<microseconds> take_time_of_day(std::string& stamp, char divider) {
-  for (std::size_t at = 0; at < stamp.size(); ++at) {
-    if (!is_digit(stamp[at]) || (at > 0 && (divider == ':' ? is_digit(stamp[at - 1]) : stamp[at - 1] != ' ')))
+// 00:59.5; after a blank also 08.00.00 and 08-00-00. Empty where there is none.
+std::optional<microseconds> take_time_of_day(std::string& stamp) {
+  static const std::string behind = R"((?: *([aApP])[mM.][^ ]*)?((?:\D.*)?))";
+  static const RE2 forms[] = {{R"((|.*?\D)(\d\d?):(\d\d?)(?::(\d\d?)(?:[.,:](\d+))?|[.,](\d+))?)" + behind},
+                              {R"((|.*? )(\d\d?)\.(\d\d?)\.(\d\d?)(?:[.,:](\d+))?())" + behind},
+                              {R"((|.*? )(\d\d?)-(\d\d?)-(\d\d?)(?:[.,:](\d+))?())" + behind}};
+  for (const RE2& form : forms) {
+    std::string before, first, second, third, fraction, of_minutes, half, rest;
+    if (!RE2::FullMatch(stamp, form, &before, &first, &second, &third, &fraction, &of_minutes, &half, &rest))
       continue;
-    std::string_view rest = std::string_view(stamp).substr(at);
-    std::array<int, 3> parts{};
-    std::size_t count = 0;
-    for (; count < parts.size(); ++count) {
-      if (count > 0 && (!rest.starts_with(divider) || rest.size() < 2 || !is_digit(rest[1]))) break;
-      if (count > 0) rest.remove_prefix(1);
-      const auto number = take_number(rest, 2);
-      if (!number) break;
-      parts[count] = *number;
-    }
-    if (count < 2 || (count == 2 && divider != ':')) continue;
-    microseconds fraction(0);
-    if (rest.size() > 1 && std::string_view(".,:").find(rest[0]) != std::string_view::npos &&
-        is_digit(rest[1])) {
-      const std::size_t end = std::min(rest.find_first_not_of(digits, 1), rest.size());
-      fraction = fraction_of(rest.substr(1, end - 1));
-      rest.remove_prefix(end);
-      if (count == 2) parts = {0, parts[0], parts[1]};
-    }
-    const std::size_t word = std::min(rest.find_first_not_of(' '), rest.size());
-    const char half = word < rest.size() ? static_cast<char>(std::tolower(rest[word])) : ' ';
-    const bool twelve = (half == 'a' || half == 'p') && word + 1 < rest.size() &&
-                        std::string_view("mM.").find(rest[word + 1]) != std::string_view::npos;
-    if (twelve) {
-      if (parts[0] < 1 || parts[0] > 12) return std::nullopt;
-      parts[0] = parts[0] % 12 + (half == 'p' ? 12 : 0);
-      rest.remove_prefix(std::min(rest.find_first_of(' ', word), rest.size()));
-    }
-    if (parts[0] > 24 || parts[1] > 59 || parts[2] > 60) return std::nullopt;
-    stamp = stamp.substr(0, at).append(" ").append(rest);
-    return std::chrono::hours(parts[0]) + minutes(parts[1]) + std::chrono::seconds(parts[2]) + fraction;
+    std::array<int, 3> parts{std::stoi(first), std::stoi(second), third.empty() ? 0 : std::stoi(third)};
+    if (!of_minutes.empty()) parts = {0, parts[0], parts[1]};
+    if (!half.empty() && (parts[0] < 1 || parts[0] > 12)) continue;
+    if (!half.empty()) parts[0] = parts[0] % 12 + (half == "p" || half == "P" ? 12 : 0);
+    const auto time = time_of(parts[0], parts[1], parts[2], fraction + of_minutes);
+    if (!time) continue;
+    stamp = before + " " + rest;
+    return time;
   }
   return std::nullopt;
 }
@@ -148,45 +108,35 @@ unsigned calendar_word(std::string word) {
 
 // A date of three numbers, or of two with the name of a month and perhaps a day's; nothing of any other text.
 // `doubt`: it may be of different days.
-std::optional<date::sys_days> date_of(std::string_view text, bool& doubt) {
-  std::vector<std::pair<int, std::size_t>> numbers;  // with their digits
+std::optional<date::sys_days> date_of(const std::string& text, bool& doubt) {
+  static const RE2 token(R"((\d+)|([A-Za-z]+))");
+  std::vector<std::string> numbers;
   unsigned named = 0;
-  const bool points = text.find('.') != std::string_view::npos;
-  while (!text.empty()) {
-    const std::size_t size = std::min(text.find_first_not_of(digits), text.size());
-    std::size_t letters = 0;
-    while (letters < text.size() && std::isalpha(static_cast<unsigned char>(text[letters])) != 0) ++letters;
-    if (size == 8) {
-      for (const std::size_t part : {4u, 2u, 2u}) {
-        numbers.emplace_back(std::stoi(std::string(text.substr(0, part))), part);
-        text.remove_prefix(part);
-      }
-    } else if (size > 0) {
-      const auto number = take_number(text, 4);
-      if (!number) return std::nullopt;
-      numbers.emplace_back(*number, size);
-    } else if (letters > 0) {
-      const std::string word(text.substr(0, letters));
-      const unsigned known = calendar_word(word);
-      if (known == 0 && word != "T" && word != "t") return std::nullopt;
-      if (known > 0 && known < 13) named = known;
-      text.remove_prefix(letters);
-    } else {
-      text.remove_prefix(1);
-    }
+  const bool points = text.find('.') != std::string::npos;
+  std::string number, word;
+  for (re2::StringPiece rest(text); RE2::FindAndConsume(&rest, token, &number, &word);) {
+    const unsigned known = calendar_word(word);
+    if (known > 0 && known < 13) named = known;
+    if (number.size() == 8)
+      numbers.insert(numbers.end(), {number.substr(0, 4), number.substr(4, 2), number.substr(6)});
+    else if (number.size() > 4 || (number.empty() && known == 0 && word != "T" && word != "t"))
+      return std::nullopt;
+    else if (!number.empty())
+      numbers.push_back(number);
   }
   std::optional<date::sys_days> found;
   const auto reading = [&](std::size_t year, std::size_t month, std::size_t day) {
-    const auto of = [&](std::size_t k) { return static_cast<unsigned>(numbers[k].first); };
-    if (numbers[year].second != 4 && numbers[year].second != 2) return;
-    const date::year_month_day whole{date::year(numbers[year].first + (numbers[year].second == 2 ? 2000 : 0)),
+    const auto of = [&](std::size_t k) { return static_cast<unsigned>(std::stoi(numbers[k])); };
+    const std::size_t digits_of_year = numbers[year].size();
+    if (digits_of_year != 4 && digits_of_year != 2) return;
+    const date::year_month_day whole{date::year(std::stoi(numbers[year]) + (digits_of_year == 2 ? 2000 : 0)),
                                      date::month(named > 0 ? named : of(month)), date::day(of(day))};
     if (!whole.ok()) return;
     doubt = doubt || (found && *found != date::sys_days(whole));
     if (!found) found = date::sys_days(whole);
   };
   if (numbers.size() != (named > 0 ? 2u : 3u)) return std::nullopt;
-  if (numbers[0].second == 4) {
+  if (numbers[0].size() == 4) {
     reading(0, 1, numbers.size() - 1);
   } else if (named > 0) {
     reading(1, 0, 0);
@@ -194,43 +144,34 @@ std::optional<date::sys_days> date_of(std::string_view text, bool& doubt) {
     reading(2, 1, 0);
     if (points) return found;
     reading(2, 0, 1);
-    if (numbers[2].second == 2) reading(0, 1, 2);
+    if (numbers[2].size() == 2) reading(0, 1, 2);
   }
   return found;
 }
 
 // The time behind a date in digits alone, or divided by anything: 20251126T080000.25, 2025-11-26-08-00-00.
 std::optional<microseconds> take_compact_time(std::string& stamp) {
-  constexpr std::size_t date_digits = 8, all_but_fraction = 14;
-  std::string number;
-  for (const char c : stamp) {
-    if (is_digit(c))
-      number += c;
-    else if (std::isalpha(static_cast<unsigned char>(c)) != 0 && c != 'T')
-      return std::nullopt;
-  }
-  if (number.size() < all_but_fraction || stamp.find_first_not_of(digits) < 4) return std::nullopt;
-  const int time = std::stoi(number.substr(date_digits, 6));
-  if (time / 10'000 > 24 || time / 100 % 100 > 59 || time % 100 > 60) return std::nullopt;
-  stamp = number.substr(0, date_digits);
-  return std::chrono::hours(time / 10'000) + minutes(time / 100 % 100) + std::chrono::seconds(time % 100) +
-         fraction_of(std::string_view(number).substr(all_but_fraction));
+  static const RE2 form(R"(\d{4}(?:[^A-Za-z]|T)*)"), numbers(R"((\d{8})(\d\d)(\d\d)(\d\d)(\d*))");
+  std::string number = stamp, day, fraction;
+  int hour = 0, minute = 0, second = 0;
+  RE2::GlobalReplace(&number, R"(\D)", "");
+  if (!RE2::FullMatch(stamp, form) ||
+      !RE2::FullMatch(number, numbers, &day, &hour, &minute, &second, &fraction))
+    return std::nullopt;
+  const auto time = time_of(hour, minute, second, fraction);
+  if (time) stamp = day;
+  return time;
 }
 
 // Takes a zone's name or abbreviation out: CET, Europe/Berlin.
 std::string take_zone_name(std::string& stamp) {
-  for (std::size_t at = 0; at < stamp.size();) {
-    const std::size_t end = std::min(stamp.find(' ', at), stamp.size());
-    const std::string word = stamp.substr(at, end - at);
-    const bool slash = word.find('/') != std::string::npos && word.find_first_of(digits) == std::string::npos;
-    const bool capitals =
-        word.size() > 2 && word.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == std::string::npos;
-    if ((slash || capitals) && calendar_word(word) == 0) {
-      stamp.erase(at, end - at);
+  static const RE2 token("([^ ]+)"), zone(R"(\D*/\D*|[A-Z]{3,})");
+  std::string word;
+  for (re2::StringPiece rest(stamp); RE2::FindAndConsume(&rest, token, &word);)
+    if (RE2::FullMatch(word, zone) && calendar_word(word) == 0) {
+      stamp.erase(stamp.size() - rest.size() - word.size(), word.size());
       return word;
     }
-    at = end + 1;
-  }
   return {};
 }
 
@@ -319,9 +260,7 @@ Result<std::int64_t> StampReader::read(std::string_view text) {
     return invalid("", "is no time of the form " + format_);
   }
   const std::string name = take_zone_name(stamp);
-  auto time_of_day = take_time_of_day(stamp, ':');
-  for (const char divider : {'.', '-'})
-    if (!time_of_day) time_of_day = take_time_of_day(stamp, divider);
+  auto time_of_day = take_time_of_day(stamp);
   if (!time_of_day) time_of_day = take_compact_time(stamp);
   if (time_of_day && stamp.find_first_not_of(" T") == std::string::npos)
     return place(LocalTime(*time_of_day), offset);
