@@ -56,7 +56,7 @@ struct Excludes {
 // "NUMBER", "INTEGER" or the name of the option's Value; empty for a flag.
 [[nodiscard]] std::string value_name(const CLI::Option& option);
 
-// "gap trial" of that subcommand; empty for the program itself.
+// "calibrate drive" of that subcommand; empty for the program itself.
 [[nodiscard]] std::string command_path(const CLI::App& app);
 
 // Neither a group of options nor hidden.

@@ -9,12 +9,11 @@ class App;
 namespace joulecast::client {
 
 // Every subcommand of joulecast, in the order that --help lists them. A new one is a file and a word here.
-// The command study adds `thesis` and `gap trial`, which execute joulecast-study: it comes after gap.
 // clang-format off
 #define FOR_EACH_COMMAND(DO)                                                                               \
   DO(profile) DO(estimate) DO(autonomy) DO(matrix) DO(robots) DO(state) DO(missions) DO(ledger) DO(export) \
   DO(proposals) DO(adopt) DO(check) DO(import) DO(replay) DO(spy) DO(simulate) DO(calibrate) DO(battery)   \
-  DO(gap) DO(effects) DO(store) DO(key) DO(token) DO(audit) DO(study) DO(completion)
+  DO(gap) DO(effects) DO(store) DO(key) DO(token) DO(audit) DO(completion)
 // clang-format on
 
 #define DECLARE_COMMAND(name) void add_##name(CLI::App& program, Exit& exit);

@@ -4,6 +4,7 @@ with currents held for a second, one on six grounds. It verifies that every log 
 base power from which it was made, that cases are the same for any number of jobs and when evaluated again, and that no
 confident name is wrong."""
 import json
+import pathlib
 
 from harness import Programs, arguments, check
 from recorded_motion import Importer, import_all
@@ -26,7 +27,8 @@ def main():
     importer = Importer(programs, options)
     import_all(importer, options)
     kept = programs.path("kept")
-    trial = ("gap", "trial", "--seed", 2000, "--json")
+    options.client = pathlib.Path(options.client).with_name("joulecast-study")
+    trial = ("trial", "--seed", 2000, "--json")
     answer = json.loads(programs.run(*trial, "--motion", importer.folder, "--count", 20, "--jobs", 2, "--keep", kept))
     check_logs(answer)
     alone = json.loads(programs.run(*trial, "--motion", importer.folder, "--count", 6))

@@ -75,7 +75,7 @@ class CommandLine : public ::testing::Test {
 TEST_F(CommandLine, CompletesCommandsAndSubcommands) {
   EXPECT_THAT(complete({"g"}), ElementsAre("gap"));
   EXPECT_THAT(complete({"calibrate", ""}), ElementsAre("drive", "battery"));
-  EXPECT_THAT(complete({"gap", "tri"}), IsEmpty());  // of joulecast-study
+  EXPECT_THAT(complete({"gap", "tri"}), IsEmpty());
 }
 
 TEST_F(CommandLine, CompletesUnusedOptions) {
