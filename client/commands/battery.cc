@@ -12,6 +12,13 @@
 #include "client/commands/table.h"
 #include "robot/robot_file.h"
 
+namespace joulecast::battery {
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Prediction, name, end_voltage_v, measured_s, predicted_s, time_error,
+                                   voltage_rms_v, voltage_rms_by_capacity_v)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PredictionSummary, count, time_error_median, time_error_p95, voltage_rms_v,
+                                   voltage_rms_worst_v, voltage_rms_by_capacity_v)
+}  // namespace joulecast::battery
+
 namespace joulecast::client {
 namespace {
 
@@ -50,25 +57,10 @@ Result<Predicted> predict_all(const BatteryOptions& options) {
 }
 
 Json prediction_json(const BatteryOptions& options, const Predicted& predicted) {
-  const battery::PredictionSummary summary = battery::summarise(predicted.done);
   Json document{{"from", options.from},
-                {"discharges", Json::array()},
+                {"discharges", predicted.done},
                 {"failed", Json::array()},
-                {"summary",
-                 {{"count", summary.count},
-                  {"time_error_median", summary.time_error_median},
-                  {"time_error_p95", summary.time_error_p95},
-                  {"voltage_rms_v", summary.voltage_rms_v},
-                  {"voltage_rms_worst_v", summary.voltage_rms_worst_v},
-                  {"voltage_rms_by_capacity_v", summary.voltage_rms_by_capacity_v}}}};
-  for (const battery::Prediction& p : predicted.done)
-    document["discharges"].push_back({{"name", p.name},
-                                      {"end_voltage_v", p.end_voltage_v},
-                                      {"measured_s", p.measured_s},
-                                      {"predicted_s", p.predicted_s},
-                                      {"time_error", p.time_error},
-                                      {"voltage_rms_v", p.voltage_rms_v},
-                                      {"voltage_rms_by_capacity_v", p.voltage_rms_by_capacity_v}});
+                {"summary", battery::summarise(predicted.done)}};
   for (const auto& [name, error] : predicted.failed)
     document["failed"].push_back({{"name", name}, {"reason", describe(error)}});
   return document;

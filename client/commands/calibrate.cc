@@ -19,6 +19,13 @@
 #include "client/progress.h"
 #include "robot/robot_file.h"
 
+namespace joulecast::battery {
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RecordingFit, name, open_circuit, voltage_rms_v)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PassedOver, name, reason)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Coverage::FastestLeftOut, name, rate_1_h, seen_to_1_h, time_error,
+                                   own_time_error, voltage_rms_v, own_voltage_rms_v)
+}  // namespace joulecast::battery
+
 namespace joulecast::client {
 namespace {
 
@@ -59,15 +66,8 @@ Json coverage_json(const battery::Coverage& seen) {
                 {"lowest_charge", seen.lowest_charge},  {"charging", seen.charging},
                 {"fastest_left_out", nullptr},          {"unseen_temperatures", Json::array()},
                 {"sentences", battery::sentences(seen)}};
-  if (seen.temperature_c) document["temperature_c"] = {seen.temperature_c->first, seen.temperature_c->second};
-  if (const auto& left = seen.fastest_left_out)
-    document["fastest_left_out"] = {{"name", left->name},
-                                    {"rate_1_h", left->rate_1_h},
-                                    {"seen_to_1_h", left->seen_to_1_h},
-                                    {"time_error", left->time_error},
-                                    {"own_time_error", left->own_time_error},
-                                    {"voltage_rms_v", left->voltage_rms_v},
-                                    {"own_voltage_rms_v", left->own_voltage_rms_v}};
+  if (seen.temperature_c) document["temperature_c"] = *seen.temperature_c;
+  if (seen.fastest_left_out) document["fastest_left_out"] = *seen.fastest_left_out;
   for (const battery::Coverage::Temperature& t : seen.unseen_temperatures)
     document["unseen_temperatures"].push_back({{"temperature_c", t.temperature_c},
                                                {"rate_1_h", t.rate_1_h},
@@ -78,17 +78,11 @@ Json coverage_json(const battery::Coverage& seen) {
 }
 
 Json calibration_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
-  Json document{{"battery", robot::battery_to_json(calibration.battery)},
-                {"iterations", calibration.iterations},
-                {"recordings", Json::array()}};
-  for (const battery::RecordingFit& fit : calibration.recordings)
-    document["recordings"].push_back(
-        {{"name", fit.name}, {"open_circuit", fit.open_circuit}, {"voltage_rms_v", fit.voltage_rms_v}});
-  document["passed_over"] = Json::array();
-  for (const battery::PassedOver& p : calibration.passed_over)
-    document["passed_over"].push_back({{"name", p.name}, {"reason", p.reason}});
-  document["coverage"] = coverage_json(seen);
-  return document;
+  return {{"battery", robot::battery_to_json(calibration.battery)},
+          {"iterations", calibration.iterations},
+          {"recordings", calibration.recordings},
+          {"passed_over", calibration.passed_over},
+          {"coverage", coverage_json(seen)}};
 }
 
 void print_calibration(const battery::Calibration& calibration, const battery::Coverage& seen) {

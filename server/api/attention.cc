@@ -19,6 +19,10 @@
 #include "server/api/services.h"
 
 namespace joulecast::api {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Acknowledgement, utime_us, by, note)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(AttentionReason, kind, subject, severity, message, action)
+
 namespace {
 
 using described::Table;
@@ -200,39 +204,22 @@ void add_service(std::vector<AttentionReason>& reasons, const Services& services
 
 // The stored form of a robot's reasons.
 std::string reasons_json(const std::vector<AttentionReason>& reasons) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const AttentionReason& r : reasons) {
-    nlohmann::json one{{"kind", r.kind},
-                       {"subject", r.subject},
-                       {"severity", static_cast<int>(r.severity)},
-                       {"message", r.message},
-                       {"action", r.action}};
-    if (r.since_utime_us) one["since_utime_us"] = *r.since_utime_us;
-    if (r.acknowledged)
-      one["acknowledged"] = {
-          {"utime_us", r.acknowledged->utime_us}, {"by", r.acknowledged->by}, {"note", r.acknowledged->note}};
-    list.push_back(std::move(one));
+  nlohmann::json list = reasons;
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    if (reasons[k].since_utime_us) list[k]["since_utime_us"] = *reasons[k].since_utime_us;
+    if (reasons[k].acknowledged) list[k]["acknowledged"] = *reasons[k].acknowledged;
   }
   return text_of({{"reasons", std::move(list)}});
 }
 
 // Throws nlohmann::json::exception for another form.
 std::vector<AttentionReason> reasons_from(const std::string& body_json) {
-  std::vector<AttentionReason> reasons;
-  const auto body = nlohmann::json::parse(body_json);
-  for (const auto& one : body.at("reasons")) {
-    AttentionReason r{one.at("kind"),
-                      static_cast<Severity>(std::clamp(one.at("severity").get<int>(), 0, 2)),
-                      {},
-                      one.at("message"),
-                      one.at("action"),
-                      one.at("subject")};
-    if (one.contains("since_utime_us")) r.since_utime_us = one["since_utime_us"];
-    if (one.contains("acknowledged")) {
-      const auto& by = one["acknowledged"];
-      r.acknowledged = Acknowledgement{by.at("utime_us"), by.at("by"), by.at("note")};
-    }
-    reasons.push_back(std::move(r));
+  const auto list = nlohmann::json::parse(body_json).at("reasons");
+  auto reasons = list.get<std::vector<AttentionReason>>();
+  for (std::size_t k = 0; k < reasons.size(); ++k) {
+    reasons[k].severity = std::clamp(reasons[k].severity, Severity::fault, Severity::notice);
+    if (list[k].contains("since_utime_us")) reasons[k].since_utime_us = list[k]["since_utime_us"];
+    if (list[k].contains("acknowledged")) reasons[k].acknowledged = list[k]["acknowledged"];
   }
   return reasons;
 }

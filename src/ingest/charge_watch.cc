@@ -2,7 +2,22 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <utility>
+
+namespace joulecast::battery {
+
+inline void to_json(nlohmann::json& document, const Seen& seen) {
+  document = {seen.count, seen.mean, seen.variance};
+}
+
+inline void from_json(const nlohmann::json& document, Seen& seen) {
+  std::tie(seen.count, seen.mean, seen.variance) = document.get<std::tuple<double, double, double>>();
+}
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ChargingHabit, current_a, taper_charge, taper_time_s, end_current_a)
+
+}  // namespace joulecast::battery
 
 namespace joulecast::ingest {
 namespace {
@@ -14,14 +29,6 @@ constexpr double standing_rad_s = 0.05;  // encoders of a robot at rest read les
 bool moves(const signals::Sample& sample) {
   return std::fabs(sample.wheel_velocity_rad_s[0]) > standing_rad_s ||
          std::fabs(sample.wheel_velocity_rad_s[1]) > standing_rad_s;
-}
-
-Json seen_json(const battery::Seen& seen) {
-  return {seen.count, seen.mean, seen.variance};
-}
-
-battery::Seen seen_from(const Json& document) {
-  return {document.at(0).get<double>(), document.at(1).get<double>(), document.at(2).get<double>()};
 }
 
 }  // namespace
@@ -99,11 +106,7 @@ std::string ChargeWatch::memory_json() const {
                           {"mean", memory->filter.mean},
                           {"covariance", std::move(lower)}};
   }
-  const battery::ChargingHabit& habit = charging_.habit();
-  document["habit"] = {{"current_a", seen_json(habit.current_a)},
-                       {"taper_charge", seen_json(habit.taper_charge)},
-                       {"taper_time_s", seen_json(habit.taper_time_s)},
-                       {"end_current_a", seen_json(habit.end_current_a)}};
+  document["habit"] = charging_.habit();
   return document.dump();
 }
 
@@ -111,9 +114,7 @@ void ChargeWatch::recall(const std::string& text) {
   const Json document = Json::parse(text, nullptr, false);
   if (!document.is_object()) return;
   try {
-    const Json& habit = document.at("habit");
-    charging_.recall({seen_from(habit.at("current_a")), seen_from(habit.at("taper_charge")),
-                      seen_from(habit.at("taper_time_s")), seen_from(habit.at("end_current_a"))});
+    charging_.recall(document.at("habit").get<battery::ChargingHabit>());
     if (!document.contains("filter")) return;
     const Json& filter = document.at("filter");
     constexpr std::size_t n = battery::ChargeFilter::size;
