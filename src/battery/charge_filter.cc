@@ -21,9 +21,8 @@ enum : Eigen::Index {
   at_error
 };
 
-constexpr auto n = static_cast<Eigen::Index>(ChargeFilter::size);
-using Vec = Eigen::Matrix<double, n, 1>;
-using Mat = Eigen::Matrix<double, n, n>;
+using Vector = ChargeFilter::Vector;
+using Matrix = ChargeFilter::Matrix;
 
 constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset drifts
 constexpr double resistance_memory_s = 12 * 3600;  // over which the resistance drifts, with temperature
@@ -41,25 +40,12 @@ constexpr std::array<double, 5> nodes{-2.856970013872806, -1.355626179974266, 0,
 constexpr std::array<double, 5> node_weights{0.011257411327721, 0.222075922005613, 0.533333333333333,
                                              0.222075922005613, 0.011257411327721};
 
-Eigen::Map<Vec> map(ChargeFilter::Vector& v) {
-  return Eigen::Map<Vec>(v.data());
-}
-Eigen::Map<const Vec> map(const ChargeFilter::Vector& v) {
-  return Eigen::Map<const Vec>(v.data());
-}
-Eigen::Map<Mat> map(ChargeFilter::Matrix& m) {
-  return Eigen::Map<Mat>(m.data());
-}
-Eigen::Map<const Mat> map(const ChargeFilter::Matrix& m) {
-  return Eigen::Map<const Mat>(m.data());
-}
-
-State state_of(const Vec& x, double temperature_c) {
+State state_of(const Vector& x, double temperature_c) {
   return {x[at_charge], {x[at_branch], x[at_branch + 1]}, {x[at_lag], x[at_lag + 1]}, temperature_c};
 }
 
 // Sets one state's variance and removes its correlation with the others.
-void isolate(Eigen::Map<Mat> p, Eigen::Index k, double variance) {
+void isolate(Matrix& p, Eigen::Index k, double variance) {
   p.row(k).setZero();
   p.col(k).setZero();
   p(k, k) = variance;
@@ -83,12 +69,10 @@ ChargeFilter::ChargeFilter(const robot::Battery& battery, const ChargeTrust& tru
 }
 
 void ChargeFilter::forget() {
-  auto x = map(mean_);
-  auto p = map(covariance_);
-  x.setZero();
-  p.setZero();
-  x[at_charge] = 0.5;
-  const auto spread = [&](Eigen::Index k, double sd) { p(k, k) = sd * sd; };
+  x_.setZero();
+  p_.setZero();
+  x_[at_charge] = 0.5;
+  const auto spread = [&](Eigen::Index k, double sd) { p_(k, k) = sd * sd; };
   spread(at_charge, trust_.unknown_charge_sd);
   spread(at_bias, bias_sd_a_);
   spread(at_factor, resistance_sd_);
@@ -99,21 +83,17 @@ void ChargeFilter::forget() {
 }
 
 void ChargeFilter::observe_charge(double value, double sd) {
-  auto x = map(mean_);
-  auto p = map(covariance_);
-  const Vec gain = p.col(at_charge) / (p(at_charge, at_charge) + sd * sd);
-  x += gain * (value - x[at_charge]);
-  const Mat taken = gain * p.row(at_charge);
-  p -= taken;
-  p = (0.5 * (p + p.transpose())).eval();
+  const Vector gain = p_.col(at_charge) / (p_(at_charge, at_charge) + sd * sd);
+  x_ += gain * (value - x_[at_charge]);
+  const Matrix taken = gain * p_.row(at_charge);
+  p_ -= taken;
+  p_ = (0.5 * (p_ + p_.transpose())).eval();
   known_ = true;
 }
 
 void ChargeFilter::advance(double current_a, double duration_s, double current_sd_a) {
   if (!(duration_s > 0)) return;
-  auto x = map(mean_);
-  auto p = map(covariance_);
-  const double true_a = current_a - x[at_bias];
+  const double true_a = current_a - x_[at_bias];
   const State before = state();
   const State after = circuit_.advanced(before, true_a, duration_s, temperature_c_);
   // All moves are linear in state and current; differences of one ampere give the derivatives exactly but for
@@ -121,8 +101,8 @@ void ChargeFilter::advance(double current_a, double duration_s, double current_s
   const State one = circuit_.advanced(before, true_a + 1, duration_s, temperature_c_);
   const State kept = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
 
-  Mat f = Mat::Identity();
-  Vec by_current = Vec::Zero();
+  Matrix f = Matrix::Identity();
+  Vector by_current = Vector::Zero();
   by_current[at_charge] = one.charge - after.charge;
   for (Eigen::Index k = 0; k < 2; ++k) {
     const auto b = static_cast<std::size_t>(k);
@@ -140,29 +120,31 @@ void ChargeFilter::advance(double current_a, double duration_s, double current_s
   f(at_factor, at_factor) = keep_factor;
   f(at_error, at_error) = keep_error;
 
-  x[at_charge] = std::clamp(after.charge, -0.05, 1.05);
+  x_[at_charge] = std::clamp(after.charge, -0.05, 1.05);
   for (Eigen::Index k = 0; k < 2; ++k) {
     const auto b = static_cast<std::size_t>(k);
-    x[at_branch + k] = after.branch_current_a[b];
-    x[at_lag + k] = after.charge_lag[b];
+    x_[at_branch + k] = after.branch_current_a[b];
+    x_[at_lag + k] = after.charge_lag[b];
   }
-  x[at_bias] *= keep_bias;
-  x[at_factor] *= keep_factor;
-  x[at_error] *= keep_error;
-  p = (f * p * f.transpose()).eval();
-  const auto wander = [&](Eigen::Index k, double sd, double keep) { p(k, k) += sd * sd * (1 - keep * keep); };
+  x_[at_bias] *= keep_bias;
+  x_[at_factor] *= keep_factor;
+  x_[at_error] *= keep_error;
+  p_ = (f * p_ * f.transpose()).eval();
+  const auto wander = [&](Eigen::Index k, double sd, double keep) {
+    p_(k, k) += sd * sd * (1 - keep * keep);
+  };
   wander(at_bias, bias_sd_a_, keep_bias);
   wander(at_factor, resistance_sd_, keep_factor);
   wander(at_error, curve_sd_v_, keep_error);
-  p(at_charge, at_charge) += trust_.gain_sd * trust_.gain_sd * trust_.correlation_charge * moved;
+  p_(at_charge, at_charge) += trust_.gain_sd * trust_.gain_sd * trust_.correlation_charge * moved;
   if (current_sd_a > 0) {
     const double blocks = std::max(1.0, trust_.modelled_current_s / duration_s);
-    p += current_sd_a * current_sd_a * blocks * by_current * by_current.transpose();
+    p_ += current_sd_a * current_sd_a * blocks * by_current * by_current.transpose();
   }
 }
 
 State ChargeFilter::state() const {
-  return state_of(map(mean_), temperature_c_);
+  return state_of(x_, temperature_c_);
 }
 
 double ChargeFilter::drop_v(const State& at, double current_a, double factor) const {
@@ -171,11 +153,8 @@ double ChargeFilter::drop_v(const State& at, double current_a, double factor) co
   return factor * ohmic;
 }
 
-ChargeFilter::Linear ChargeFilter::linearise(const Vector& mean, const Matrix& covariance,
-                                             double current_a) const {
-  const auto x = map(mean);
-  const auto p = map(covariance);
-  Vec surface = Vec::Zero();
+ChargeFilter::Linear ChargeFilter::linearise(const Vector& x, const Matrix& p, double current_a) const {
+  Vector surface = Vector::Zero();
   surface[at_charge] = 1;
   surface[at_lag] = surface[at_lag + 1] = -1;
   const double spread = std::sqrt(std::max(1e-12, surface.dot(p * surface)));
@@ -196,27 +175,24 @@ ChargeFilter::Linear ChargeFilter::linearise(const Vector& mean, const Matrix& c
   for (std::size_t k = 0; k < nodes.size(); ++k)
     variance += node_weights[k] * std::pow(volts[k] - mean_v - slope * spread * nodes[k], 2);
 
-  Linear out{mean_v + x[at_error], {}, variance};
-  Eigen::Map<Vec> h(out.h.data());
-  h = slope * surface;
+  Vector h = slope * surface;
   for (Eigen::Index k = 0; k < 2; ++k)
     h[at_branch + k] = -factor * circuit_.branch_resistance_ohm(static_cast<std::size_t>(k), at);
   h[at_bias] = factor * circuit_.ohmic_resistance_ohm(at);
   h[at_factor] = -drop_v(at, true_a, factor);
   h[at_error] = 1;
-  return out;
+  return {mean_v + x[at_error], h, variance};
 }
 
 // Where along the curve the voltage would be met by the rest of the state.
 double ChargeFilter::charge_at(double voltage_v, double current_a) const {
-  const auto x = map(mean_);
   constexpr int steps = 100;
-  double best = x[at_charge], least = std::numeric_limits<double>::infinity();
+  double best = x_[at_charge], least = std::numeric_limits<double>::infinity();
   for (int k = 0; k <= steps; ++k) {
     State there = state();
     there.charge = static_cast<double>(k) / steps;
     const double expected = circuit_.open_circuit_voltage_v(there.surface_charge()) -
-                            drop_v(there, current_a - x[at_bias], std::exp(x[at_factor]));
+                            drop_v(there, current_a - x_[at_bias], std::exp(x_[at_factor]));
     if (std::abs(expected - voltage_v) < least) {
       least = std::abs(expected - voltage_v);
       best = there.charge;
@@ -227,17 +203,15 @@ double ChargeFilter::charge_at(double voltage_v, double current_a) const {
 
 // The current before the first reading is unknown; it was probably similar to the first one.
 void ChargeFilter::begin(double current_a) {
-  auto x = map(mean_);
-  auto p = map(covariance_);
   const double sd_a = 0.5 * std::abs(current_a) + trust_.unknown_current_per_h * circuit_.capacity_ah();
   const State mean = circuit_.advanced({}, 0.5 * current_a, seconds_per_hour, temperature_c_);
   const State spread = circuit_.advanced({}, sd_a, seconds_per_hour, temperature_c_);
   for (Eigen::Index k = 0; k < 2; ++k) {
     const auto b = static_cast<std::size_t>(k);
-    x[at_branch + k] = mean.branch_current_a[b];
-    x[at_lag + k] = mean.charge_lag[b];
-    isolate(p, at_branch + k, std::pow(spread.branch_current_a[b], 2));
-    isolate(p, at_lag + k, std::pow(spread.charge_lag[b], 2));
+    x_[at_branch + k] = mean.branch_current_a[b];
+    x_[at_lag + k] = mean.charge_lag[b];
+    isolate(p_, at_branch + k, std::pow(spread.branch_current_a[b], 2));
+    isolate(p_, at_lag + k, std::pow(spread.charge_lag[b], 2));
   }
 }
 
@@ -266,35 +240,31 @@ void ChargeFilter::correct(double voltage_v, double current_a, double more_noise
     first_v_ = std::move(first);
   }
   if (!known_) begin(current_a);
-  const Vector prior_mean = mean_;
-  const Matrix prior_covariance = covariance_;
-  const auto x0 = map(prior_mean);
-  const auto p0 = map(prior_covariance);
+  const Vector x0 = x_;
+  const Matrix p0 = p_;
   const double noise_v = std::hypot(trust_.voltage_noise * nominal_voltage_v_, more_noise_v,
                                     trust_.drop_sd * drop_v(state(), current_a - x0[at_bias], 1));
-  auto x = map(mean_);
-  auto p = map(covariance_);
   // A displaced curve is displaced in every reading: all of them contain no more information than the first.
   const bool repeated = shift_stays_ && known_;
   if (!known_) {
     // The first line is drawn where the voltage points to.
-    x[at_charge] = charge_at(voltage_v, current_a);
-    isolate(p, at_charge, first_spread * first_spread);
+    x_[at_charge] = charge_at(voltage_v, current_a);
+    isolate(p_, at_charge, first_spread * first_spread);
   }
   for (int iteration = 0; iteration < most_iterations; ++iteration) {
-    const Linear linear = linearise(mean_, covariance_, current_a);
-    const Eigen::Map<const Vec> h(linear.h.data());
+    const Linear linear = linearise(x_, p_, current_a);
+    const Vector& h = linear.h;
     // The line through the expansion point, applied to the prior.
-    const double expected = linear.mean_v + h.dot(x0 - x);
-    const Vec ph = p0 * h;
+    const double expected = linear.mean_v + h.dot(x0 - x_);
+    const Vector ph = p0 * h;
     const double shift_v = shift_sd_ * (repeated ? std::sqrt(shift_updates) : 1) * h[at_charge];
     const double innovation_variance = h.dot(ph) + linear.variance_v2 + noise_v * noise_v + shift_v * shift_v;
     const double innovation = voltage_v - expected;
     if (iteration == 0 && known_) {
       double surprise = innovation / std::sqrt(innovation_variance);
       // A charge far off the voltage's, on a steep piece of the curve, hides in the curve's error.
-      if (std::abs(x[at_error]) > strained_sd * curve_sd_v_)
-        surprise = std::copysign(contradiction_sd, x[at_error]);
+      if (std::abs(x_[at_error]) > strained_sd * curve_sd_v_)
+        surprise = std::copysign(contradiction_sd, x_[at_error]);
       if (std::abs(surprise) < contradiction_sd) {
         contradictions_ = 0;
       } else {
@@ -302,57 +272,55 @@ void ChargeFilter::correct(double voltage_v, double current_a, double more_noise
         contradictions_ = contradictions_ * way > 0 ? contradictions_ + way : way;
       }
       if (std::abs(contradictions_) >= contradictions_to_restart) {
-        const double offset_a = x[at_bias], offset_variance = p(at_bias, at_bias);
+        const double offset_a = x_[at_bias], offset_variance = p_(at_bias, at_bias);
         forget();
-        x[at_bias] = offset_a;
-        p(at_bias, at_bias) = offset_variance;
+        x_[at_bias] = offset_a;
+        p_(at_bias, at_bias) = offset_variance;
         ++restarts_;
         return correct(voltage_v, current_a, more_noise_v);
       }
       // A single contradiction may be a glitch: wait for more.
       if (contradictions_ != 0) return;
     }
-    const double before = x[at_charge], sd = std::sqrt(p(at_charge, at_charge));
-    const Vec gain = ph / innovation_variance;
-    x = x0 + gain * innovation;
-    p = p0 - gain * ph.transpose();
-    p = (0.5 * (p + p.transpose())).eval();
-    if (iteration > 0 && std::abs(x[at_charge] - before) < 0.02 * sd &&
-        std::abs(std::sqrt(p(at_charge, at_charge)) - sd) < 0.02 * sd)
+    const double before = x_[at_charge], sd = std::sqrt(p_(at_charge, at_charge));
+    const Vector gain = ph / innovation_variance;
+    x_ = x0 + gain * innovation;
+    p_ = p0 - gain * ph.transpose();
+    p_ = (0.5 * (p_ + p_.transpose())).eval();
+    if (iteration > 0 && std::abs(x_[at_charge] - before) < 0.02 * sd &&
+        std::abs(std::sqrt(p_(at_charge, at_charge)) - sd) < 0.02 * sd)
       break;
   }
-  x[at_charge] = std::clamp(x[at_charge], -0.05, 1.05);
+  x_[at_charge] = std::clamp(x_[at_charge], -0.05, 1.05);
   known_ = true;
 }
 
 void ChargeFilter::gap(double duration_s) {
-  auto x = map(mean_);
-  auto p = map(covariance_);
   const double current_sd_a = trust_.unknown_current_per_h * circuit_.capacity_ah();
   const State after = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
   const State driven = circuit_.advanced({}, current_sd_a, duration_s, temperature_c_);
   for (Eigen::Index k = 0; k < 2; ++k) {
     const auto b = static_cast<std::size_t>(k);
     const auto relax = [&](Eigen::Index at, double keep, double sd) {
-      x[at] *= keep;
-      p.row(at) *= keep;
-      p.col(at) *= keep;
-      p(at, at) += sd * sd;
+      x_[at] *= keep;
+      p_.row(at) *= keep;
+      p_.col(at) *= keep;
+      p_(at, at) += sd * sd;
     };
     relax(at_branch + k, after.branch_current_a[b], driven.branch_current_a[b]);
     relax(at_lag + k, after.charge_lag[b], driven.charge_lag[b]);
   }
   const double lost = trust_.unknown_current_per_h * duration_s / seconds_per_hour;
   const double most = trust_.unknown_charge_sd * trust_.unknown_charge_sd;
-  p(at_charge, at_charge) =
-      std::max(p(at_charge, at_charge), std::min(most, p(at_charge, at_charge) + lost * lost));
+  p_(at_charge, at_charge) =
+      std::max(p_(at_charge, at_charge), std::min(most, p_(at_charge, at_charge) + lost * lost));
   // The other states drift as in advance(), without its charge.
   const auto wander = [&](Eigen::Index k, double sd, double memory_s) {
     const double keep = std::exp(-duration_s / memory_s);
-    x[k] *= keep;
-    p.row(k) *= keep;
-    p.col(k) *= keep;
-    p(k, k) += sd * sd * (1 - keep * keep);
+    x_[k] *= keep;
+    p_.row(k) *= keep;
+    p_.col(k) *= keep;
+    p_(k, k) += sd * sd * (1 - keep * keep);
   };
   wander(at_bias, bias_sd_a_, bias_memory_s);
   wander(at_factor, resistance_sd_, resistance_memory_s);
@@ -360,37 +328,37 @@ void ChargeFilter::gap(double duration_s) {
 }
 
 double ChargeFilter::charge() const {
-  return std::clamp(mean_[static_cast<std::size_t>(at_charge)], 0.0, 1.0);
+  return std::clamp(x_[at_charge], 0.0, 1.0);
 }
 
 double ChargeFilter::charge_sd() const {
-  return std::sqrt(map(covariance_)(at_charge, at_charge));
+  return std::sqrt(p_(at_charge, at_charge));
 }
 
 double ChargeFilter::current_bias_a() const {
-  return map(mean_)[at_bias];
+  return x_[at_bias];
 }
 
 double ChargeFilter::current_bias_sd_a() const {
-  return std::sqrt(map(covariance_)(at_bias, at_bias));
+  return std::sqrt(p_(at_bias, at_bias));
 }
 
 double ChargeFilter::voltage_only_sd() const {
-  Matrix wide = covariance_;
+  Matrix wide = p_;
   // Over a tenth of the capacity: single points of a measured curve are noisy.
-  isolate(map(wide), at_charge, 0.05 * 0.05);
-  const Linear linear = linearise(mean_, wide, 0);
-  const double slope = linear.h[static_cast<std::size_t>(at_charge)];
-  return std::hypot(curve_sd_v_, trust_.voltage_noise * nominal_voltage_v_) / std::max(slope, 1e-9);
+  isolate(wide, at_charge, 0.05 * 0.05);
+  const Linear linear = linearise(x_, wide, 0);
+  return std::hypot(curve_sd_v_, trust_.voltage_noise * nominal_voltage_v_) /
+         std::max(linear.h[at_charge], 1e-9);
 }
 
 bool ChargeFilter::recall(const Memory& memory) {
-  const auto p = map(memory.covariance);
-  if (!map(memory.mean).allFinite() || !p.allFinite() || !(p.diagonal().minCoeff() >= 0) ||
+  const Matrix& p = memory.covariance;
+  if (!memory.mean.allFinite() || !p.allFinite() || !(p.diagonal().minCoeff() >= 0) ||
       !(p(at_charge, at_charge) > 0))
     return false;
-  mean_ = memory.mean;
-  covariance_ = memory.covariance;
+  x_ = memory.mean;
+  p_ = p;
   known_ = memory.known;
   contradictions_ = 0;
   // The first readings are not stored.

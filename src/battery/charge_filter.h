@@ -1,6 +1,6 @@
 #pragma once
 
-#include <array>
+#include <Eigen/Core>
 #include <cstddef>
 #include <vector>
 
@@ -42,9 +42,9 @@ struct ChargeTrust {
 // was wrong) makes the filter start over from the voltage.
 class ChargeFilter {
  public:
-  static constexpr std::size_t size = 8;
-  using Vector = std::array<double, size>;
-  using Matrix = std::array<double, size * size>;  // symmetric
+  static constexpr int size = 8;
+  using Vector = Eigen::Matrix<double, size, 1>;
+  using Matrix = Eigen::Matrix<double, size, size>;  // symmetric
 
   explicit ChargeFilter(const robot::Battery& battery, const ChargeTrust& trust = {});
 
@@ -76,25 +76,25 @@ class ChargeFilter {
 
   // State to be restored after a restart.
   struct Memory {
-    Vector mean{};
-    Matrix covariance{};
+    Vector mean = Vector::Zero();
+    Matrix covariance = Matrix::Zero();
     bool known = false;
   };
-  Memory memory() const { return {mean_, covariance_, known_}; }
+  Memory memory() const { return {x_, p_, known_}; }
   // False, without a change, when the memory is invalid (not finite, variance not positive).
   bool recall(const Memory& memory);
 
  private:
   bool revises_first(double& voltage_v, double current_a);
   struct Linear {
-    double mean_v;               // expected voltage
-    std::array<double, size> h;  // its derivatives
-    double variance_v2;          // of the nonlinear part
+    double mean_v;       // expected voltage
+    Vector h;            // its derivatives
+    double variance_v2;  // of the nonlinear part
   };
   State state() const;
   void begin(double current_a);
   double charge_at(double voltage_v, double current_a) const;
-  Linear linearise(const Vector& mean, const Matrix& covariance, double current_a) const;
+  Linear linearise(const Vector& x, const Matrix& p, double current_a) const;
   double drop_v(const State& state, double current_a, double resistance_factor) const;
 
   Circuit circuit_;
@@ -108,8 +108,8 @@ class ChargeFilter {
   double resistance_sd_;
   double bias_sd_a_;
   double temperature_c_ = reference_temperature_c;
-  Vector mean_{};
-  Matrix covariance_{};
+  Vector x_;  // mean
+  Matrix p_;  // covariance
   bool known_ = false;
   int contradictions_ = 0;  // in succession, of one sign
   std::size_t restarts_ = 0;

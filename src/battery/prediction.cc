@@ -6,18 +6,10 @@
 #include <cmath>
 
 #include "base/try.h"
+#include "statistics/robust.h"
 
 namespace joulecast::battery {
 namespace {
-
-// Linear interpolation between order statistics, share from 0 to 1.
-double quantile(std::vector<double> values, double share) {
-  std::sort(values.begin(), values.end());
-  const double at = share * static_cast<double>(values.size() - 1);
-  const auto below = static_cast<std::size_t>(at);
-  const std::size_t above = std::min(below + 1, values.size() - 1);
-  return values[below] + (at - static_cast<double>(below)) * (values[above] - values[below]);
-}
 
 bool same_current(const Recording& recording, std::size_t row) {
   return std::abs(recording.current_a[row] - recording.current_a[row - 1]) <=
@@ -108,8 +100,8 @@ PredictionSummary summarise(const std::vector<Prediction>& predictions) {
     sum_by_capacity += std::pow(prediction.voltage_rms_by_capacity_v, 2);
     out.voltage_rms_worst_v = std::max(out.voltage_rms_worst_v, prediction.voltage_rms_v);
   }
-  out.time_error_median = quantile(errors, 0.5);
-  out.time_error_p95 = quantile(errors, 0.95);
+  out.time_error_median = statistics::quantile(errors, 0.5);
+  out.time_error_p95 = statistics::quantile(errors, 0.95);
   const auto count = static_cast<double>(predictions.size());
   out.voltage_rms_v = std::sqrt(sum / count);
   out.voltage_rms_by_capacity_v = std::sqrt(sum_by_capacity / count);

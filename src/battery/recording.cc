@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <boost/algorithm/string/predicate.hpp>
 #include <limits>
 #include <optional>
 
@@ -42,12 +42,6 @@ std::vector<std::string_view> cells_of(std::string_view line) {
   }
 }
 
-bool same_name(std::string_view a, std::string_view b) {
-  return !a.empty() &&
-         std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
-}
-
 // The position of each of our columns in the header.
 Result<std::vector<std::optional<std::size_t>>> positions(std::string_view header) {
   if (header.starts_with("\xef\xbb\xbf")) header.remove_prefix(3);
@@ -55,8 +49,8 @@ Result<std::vector<std::optional<std::size_t>>> positions(std::string_view heade
   std::vector<std::optional<std::size_t>> found(columns);
   for (std::size_t c = 0; c < columns; ++c) {
     for (const std::string_view name : column_names[c]) {
-      const auto at = std::find_if(cells.begin(), cells.end(),
-                                   [&](std::string_view cell) { return same_name(cell, name); });
+      const auto at = std::ranges::find_if(
+          cells, [&](std::string_view cell) { return boost::algorithm::iequals(cell, name); });
       if (at == cells.end()) continue;
       found[c] = static_cast<std::size_t>(at - cells.begin());
       break;
@@ -104,7 +98,7 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
       value[c] = std::numeric_limits<double>::quiet_NaN();
       if (!(at)[c]) continue;
       const std::string_view cell = *(at)[c] < cells.size() ? cells[*(at)[c]] : std::string_view{};
-      if (c == temperature_column && (cell.empty() || same_name(cell, "nan"))) continue;
+      if (c == temperature_column && (cell.empty() || boost::algorithm::iequals(cell, "nan"))) continue;
       const auto read = to_number<double>(cell);
       if (!read)
         return invalid(

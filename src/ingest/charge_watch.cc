@@ -96,14 +96,13 @@ ChargeView ChargeWatch::view() const {
 std::string ChargeWatch::memory_json() const {
   Json document;
   if (const auto memory = tracker_.memory()) {
-    constexpr std::size_t n = battery::ChargeFilter::size;
+    const auto& [mean, covariance, known] = memory->filter;
     Json lower = Json::array();
-    for (std::size_t row = 0; row < n; ++row)
-      for (std::size_t column = 0; column <= row; ++column)
-        lower.push_back(memory->filter.covariance[row * n + column]);
+    for (Eigen::Index row = 0; row < covariance.rows(); ++row)
+      for (Eigen::Index column = 0; column <= row; ++column) lower.push_back(covariance(row, column));
     document["filter"] = {{"utime_us", memory->utime_us},
-                          {"known", memory->filter.known},
-                          {"mean", memory->filter.mean},
+                          {"known", known},
+                          {"mean", std::vector(mean.begin(), mean.end())},
                           {"covariance", std::move(lower)}};
   }
   document["habit"] = charging_.habit();
@@ -117,16 +116,16 @@ void ChargeWatch::recall(const std::string& text) {
     charging_.recall(document.at("habit").get<battery::ChargingHabit>());
     if (!document.contains("filter")) return;
     const Json& filter = document.at("filter");
-    constexpr std::size_t n = battery::ChargeFilter::size;
     battery::ChargeTracker::Memory memory;
+    auto& [mean, covariance, known] = memory.filter;
     memory.utime_us = filter.at("utime_us").get<std::int64_t>();
-    memory.filter.known = filter.at("known").get<bool>();
-    memory.filter.mean = filter.at("mean").get<battery::ChargeFilter::Vector>();
+    known = filter.at("known").get<bool>();
     std::size_t k = 0;
-    for (std::size_t row = 0; row < n; ++row)
-      for (std::size_t column = 0; column <= row; ++column, ++k)
-        memory.filter.covariance[row * n + column] = memory.filter.covariance[column * n + row] =
-            filter.at("covariance").at(k).get<double>();
+    for (Eigen::Index row = 0; row < covariance.rows(); ++row) {
+      mean[row] = filter.at("mean").at(static_cast<std::size_t>(row)).get<double>();
+      for (Eigen::Index column = 0; column <= row; ++column, ++k)
+        covariance(row, column) = covariance(column, row) = filter.at("covariance").at(k).get<double>();
+    }
     if (tracker_.recall(memory)) utime_us_ = memory.utime_us;
   } catch (const Json::exception&) {
     // Written by another version: the charge is estimated again from the voltage.
