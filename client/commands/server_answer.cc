@@ -9,6 +9,7 @@
 #include <cstdlib>
 
 #include "base/json_text.h"
+#include "base/text.h"
 #include "base/try.h"
 #include "client/files.h"
 
@@ -21,17 +22,6 @@ std::string environment(const char* name) {
 }
 
 }  // namespace
-
-std::string percent_encoded(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                       std::string_view("-._~").find(c) != std::string_view::npos;
-    plain ? out.push_back(c) : static_cast<void>(out += fmt::format("%{:02X}", byte));
-  }
-  return out;
-}
 
 std::string target_of(std::string_view path, const Query& query) {
   std::string target(path);

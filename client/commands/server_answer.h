@@ -66,7 +66,6 @@ using Query = std::vector<std::pair<std::string, std::string>>;
 
 // "/v1/missions" -> "/v1/missions?robot_id=amr", percent-encoded.
 [[nodiscard]] std::string target_of(std::string_view path, const Query& query);
-[[nodiscard]] std::string percent_encoded(std::string_view text);
 // "/v1/robots/amr/state"
 [[nodiscard]] std::string robot_target(const std::string& robot_id, const std::string& part = {});
 

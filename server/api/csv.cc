@@ -8,26 +8,11 @@
 #include <utility>
 
 #include "base/resolution.h"
+#include "base/text.h"
 #include "server/http/text.h"
 
 namespace joulecast::api {
 namespace {
-
-std::string percent_encoded(std::string_view text) {
-  constexpr std::string_view digits = "0123456789ABCDEF";
-  constexpr std::string_view plain = "-._~";
-  std::string encoded;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-    if (letter || plain.find(c) != std::string_view::npos) {
-      encoded += c;
-    } else {
-      encoded += {'%', digits[byte >> 4], digits[byte & 15]};
-    }
-  }
-  return encoded;
-}
 
 // Whether a spreadsheet may read the text as a formula: it begins with one of OWASP's characters, or their
 // full-width forms, behind blanks that spreadsheets trim

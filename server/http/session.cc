@@ -396,30 +396,16 @@ void Session::do_work() {
   }
 }
 
-WorkerPool::WorkerPool(unsigned threads, std::size_t capacity) : capacity_(capacity) {
-  for (unsigned i = 0; i < std::max(threads, 1U); ++i)
-    threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
-}
-
 bool WorkerPool::submit(std::function<void()> task, bool admitted) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!admitted && queue_.size() >= capacity_) return false;
-    queue_.push_back(std::move(task));
+  if (waiting_++ >= capacity_ && !admitted) {
+    --waiting_;
+    return false;
   }
-  filled_.notify_one();
-  return true;
-}
-
-void WorkerPool::work(const std::stop_token& stop) {
-  for (;;) {
-    std::unique_lock lock(mutex_);
-    if (!filled_.wait(lock, stop, [this] { return !queue_.empty(); })) return;
-    auto task = std::move(queue_.front());
-    queue_.pop_front();
-    lock.unlock();
+  net::post(threads_, [this, task = std::move(task)] {
+    --waiting_;
     task();
-  }
+  });
+  return true;
 }
 
 }  // namespace joulecast::http

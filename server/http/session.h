@@ -4,20 +4,16 @@
 // stated.
 #include "server/http/asio.h"
 // asio.h stays first.
+#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
 #include <unordered_set>
 #include <vector>
 
@@ -64,21 +60,17 @@ struct Caller {
 // A few threads and a bounded queue. Tasks must not throw.
 class WorkerPool {
  public:
-  WorkerPool(unsigned threads, std::size_t capacity);
-  ~WorkerPool() = default;  // runs queued tasks, then joins
+  WorkerPool(unsigned threads, std::size_t capacity) : capacity_(capacity), threads_(std::max(threads, 1U)) {}
+  ~WorkerPool() { threads_.join(); }  // runs queued tasks first
 
   // False when the queue is full; `admitted`, for the next piece of work that has begun, is never refused.
   // Any thread.
   bool submit(std::function<void()> task, bool admitted = false);
 
  private:
-  void work(const std::stop_token& stop);
-
-  std::mutex mutex_;
-  std::condition_variable_any filled_;
-  std::deque<std::function<void()>> queue_;
-  std::size_t capacity_;
-  std::vector<std::jthread> threads_;
+  const std::size_t capacity_;
+  std::atomic<std::size_t> waiting_{0};
+  net::thread_pool threads_;
 };
 
 struct Core {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <type_traits>
 
@@ -33,6 +34,21 @@ std::optional<T> to_number(std::string_view text) {
   if constexpr (std::is_floating_point_v<T>)
     if (!std::isfinite(number)) return std::nullopt;
   return number;
+}
+
+// For a URI: all but RFC 3986's unreserved characters as %XX.
+inline std::string percent_encoded(std::string_view text) {
+  constexpr std::string_view digits = "0123456789ABCDEF", unreserved = "-._~";
+  std::string encoded;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+    if (letter || unreserved.find(c) != std::string_view::npos)
+      encoded += c;
+    else
+      encoded += {'%', digits[byte >> 4], digits[byte & 15]};
+  }
+  return encoded;
 }
 
 // FNV-1a, 64 bits, continued from `hash`. It detects mistakes and distinguishes versions; it does not resist
