@@ -369,8 +369,8 @@ Table<planning::Profile> make_columns(bool null_positions) {
       .column("acceleration_m_s2", &P::acceleration_m_s2, "forward acceleration")
       .column("yaw_acceleration_rad_s2", &P::yaw_acceleration_rad_s2, "change of the rate of turning")
       .column("payload_kg", &P::payload_kg, "payload from here on", 3)
-      .column("power_w", &P::power_w, "power drawn from the battery", 4)
-      .column("energy_j", &P::energy_j, "drawn from the battery up to here", 4);
+      .all_digits("power_w", &P::power_w, "power drawn from the battery", false)
+      .all_digits("energy_j", &P::energy_j, "drawn from the battery up to here", false);
 }
 
 }  // namespace

@@ -145,8 +145,8 @@ const Table<ProfileAnswer>& baselines_table() {
           .column("time_s", &Baseline::time_s, "time since the start")
           .column("speed_m_s", &Baseline::speed_m_s, "forward speed; negative: backwards")
           .column("yaw_rate_rad_s", &Baseline::yaw_rate_rad_s, "rate of turning, positive to the left")
-          .column("power_w", &Baseline::power_w, "power drawn from the battery", 4)
-          .column("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", 4);
+          .all_digits("power_w", &Baseline::power_w, "power drawn from the battery", false)
+          .all_digits("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", false);
   static const auto baseline =
       Table<BaselineAnswer>()
           .value("energy_j", AT(baseline.motion.energy_j), drawn_words)

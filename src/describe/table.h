@@ -104,8 +104,8 @@ class Table {
   }
   // An array of numbers as JsonWriter::value() writes them, null where they are not finite.
   template <class Get>
-  Table& all_digits(std::string name, Get get, std::string_view words) {
-    return array(std::move(name), get, words, of_type("number", true));
+  Table& all_digits(std::string name, Get get, std::string_view words, bool or_null = true) {
+    return array(std::move(name), get, words, of_type("number", or_null));
   }
   // An array of numbers with all digits, for raw data, null where they are not finite.
   template <class Get>

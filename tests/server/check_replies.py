@@ -456,6 +456,8 @@ def hold_conveniences(checker, name):
     whole = checker.check(drive[0], drive[1], drive[2] + "?digits=17", body, expect=200)
     usual = checker.check(*drive, body, expect=200)
     few = checker.check(drive[0], drive[1], drive[2] + "?digits=3", body, expect=200)
+    if abs(whole["profile"]["energy_j"][-1] / whole["energy_j"] - 1) > 1e-9:
+        checker.fault(f"digits=17: the column of energies ends at {whole['profile']['energy_j'][-1]}, the energy is {whole['energy_j']}")
     for answer, digits in ((usual, 10), (few, 3)):
         if answer["energy_j"] != float(f"{whole['energy_j']:.{digits}g}") and answer["energy_j"] < 10**digits:
             checker.fault(f"{digits} digits of {whole['energy_j']}: {answer['energy_j']}")
