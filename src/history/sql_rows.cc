@@ -16,11 +16,14 @@ std::string text_of(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-// Reads a JSON array, each element through `add`, which returns whether it is valid.
-template <class Add>
-bool read_array(const std::string& text, Add add) {
-  const json all = json::parse(text, nullptr, false);
-  return all.is_array() && std::ranges::all_of(all, add);
+// False if the text is not the JSON of such a value.
+template <class T>
+bool read_json(const std::string& text, T& value) try {
+  const json document = json::parse(text);
+  document.get_to(value);
+  return document == json(value);
+} catch (const json::exception&) {
+  return false;
 }
 
 }  // namespace
@@ -63,45 +66,32 @@ void bind_value(Rows& rows, const std::vector<std::array<double, 2>>& places) {
 }
 
 bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts) {
-  const json all = json::parse(rows.text(), nullptr, false);
-  if (!all.is_object()) return false;
-  for (const auto& [reason, count] : all.items()) {
-    if (!count.is_number_integer()) return false;
-    counts[reason] = count.get<std::int64_t>();
-  }
-  return true;
+  return read_json(rows.text(), counts);
 }
 
 bool read_value(Rows& rows, std::vector<CovariateSummary>& covariates) {
   const std::string text = rows.text();
+  if (text.empty()) return true;
+  const json all = json::parse(text, nullptr, false);
   const auto real = [](const json& value) {
     return value.is_number() ? value.get<double>() : signals::unmeasured;
   };
-  return text.empty() || read_array(text, [&](const json& row) {
-           if (!row.is_array() || row.size() != 8 || !row[0].is_string() || !row[5].is_number_integer() ||
-               !row[7].is_number_integer())
-             return false;
-           covariates.push_back({row[0].get<std::string>(), real(row[1]), real(row[2]), real(row[3]),
-                                 real(row[4]), row[5].get<std::int64_t>(), real(row[6]),
-                                 row[7].get<std::int64_t>()});
-           return true;
-         });
+  for (const json& row : all) {
+    if (!row.is_array() || row.size() != 8 || !row[0].is_string() || !row[5].is_number_integer() ||
+        !row[7].is_number_integer())
+      return false;
+    covariates.push_back({row[0].get<std::string>(), real(row[1]), real(row[2]), real(row[3]), real(row[4]),
+                          row[5].get<std::int64_t>(), real(row[6]), row[7].get<std::int64_t>()});
+  }
+  return all.is_array();
 }
 
 bool read_value(Rows& rows, std::vector<MissionKey>& keys) {
-  return read_array(rows.text(), [&](const json& key) {
-    if (key.is_number_integer()) keys.push_back(key.get<MissionKey>());
-    return key.is_number_integer();
-  });
+  return read_json(rows.text(), keys);
 }
 
 bool read_value(Rows& rows, std::vector<std::array<double, 2>>& places) {
-  return read_array(rows.text(), [&](const json& place) {
-    const bool is_valid =
-        place.is_array() && place.size() == 2 && place[0].is_number() && place[1].is_number();
-    if (is_valid) places.push_back(place.get<std::array<double, 2>>());
-    return is_valid;
-  });
+  return read_json(rows.text(), places);
 }
 
 BulkRows::BulkRows(std::string table, std::string columns,

@@ -52,33 +52,10 @@ Result<void> copy_into(Database& from, const std::string& file) {
       file);
 }
 
-// Ranges of keys that could not be read, those that touch as one.
-class LostKeys {
- public:
-  LostKeys(std::string table, std::string key) : table_(std::move(table)), key_(std::move(key)) {}
-
-  void add(std::int64_t from, std::int64_t to, const std::string& why) {
-    if (!ranges_.empty() && ranges_.back().to + 1 == from)
-      ranges_.back().to = to;
-    else
-      ranges_.push_back({from, to, why});
-  }
-
-  void append_to(std::vector<std::string>& losses) const {
-    for (const Range& range : ranges_) {
-      if (losses.size() >= max_faults) return;
-      losses.push_back(table_ + ", its rows with " + key_ + " " + std::to_string(range.from) +
-                       (range.from == range.to ? "" : " to " + std::to_string(range.to)) + ": " + range.why);
-    }
-  }
-
- private:
-  struct Range {
-    std::int64_t from, to;
-    std::string why;
-  };
-  std::string table_, key_;
-  std::vector<Range> ranges_;
+// A range of keys that could not be read.
+struct LostKeys {
+  std::int64_t from, to;
+  std::string why;
 };
 
 // The columns that a table has in both files, as a list; empty where the damaged one has no such table.
@@ -95,7 +72,7 @@ std::string common_columns(Database& database, const std::string& table) {
 // long as rows can be expected.
 void salvage_range(Database& database, const std::string& table, const std::string& columns,
                    const std::string& key, std::int64_t from, std::int64_t to, int& failures,
-                   LostKeys& losses) {
+                   std::vector<LostKeys>& lost) {
   try {
     Rows(database,
          "INSERT OR IGNORE INTO main." + table + " (" + columns + ") SELECT " + columns + " FROM damaged." +
@@ -104,10 +81,16 @@ void salvage_range(Database& database, const std::string& table, const std::stri
         .run();
   } catch (const SqlError& error) {
     if (error.fault() != Fault::corrupt) throw;
-    if (from == to || ++failures > most_failures) return losses.add(from, to, error.what());
+    if (from == to || ++failures > most_failures) {
+      if (!lost.empty() && lost.back().to + 1 == from)
+        lost.back().to = to;
+      else
+        lost.push_back({from, to, error.what()});
+      return;
+    }
     const std::int64_t middle = from + (to - from) / 2;
-    salvage_range(database, table, columns, key, from, middle, failures, losses);
-    salvage_range(database, table, columns, key, middle + 1, to, failures, losses);
+    salvage_range(database, table, columns, key, from, middle, failures, lost);
+    salvage_range(database, table, columns, key, middle + 1, to, failures, lost);
   }
 }
 
@@ -257,9 +240,12 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
           const std::string columns = common_columns(database, table);
           if (columns.empty()) continue;
           int failures = 0;
-          LostKeys losses(table, key);
-          salvage_range(database, table, columns, key, 0, greatest(database, table, key), failures, losses);
-          losses.append_to(salvage.losses);
+          std::vector<LostKeys> lost;
+          salvage_range(database, table, columns, key, 0, greatest(database, table, key), failures, lost);
+          for (const auto& [from, to, why] : lost)
+            if (salvage.losses.size() < max_faults)
+              salvage.losses.push_back(table + ", its rows with " + key + " " + std::to_string(from) +
+                                       (from == to ? "" : " to " + std::to_string(to)) + ": " + why);
         }
         drop_loose_ends(database, salvage);
         report_damage(database, salvage);
