@@ -23,126 +23,83 @@ template <class T>
 concept PlainValue = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 
 template <class Members>
-class ByteSaver {
+class ByteArchive {
  public:
-  explicit ByteSaver(std::vector<std::byte>& out) : out_(out) {}
+  // Appends values to `out`.
+  explicit ByteArchive(std::vector<std::byte>* out) : out_(out) {}
+  // Reads values into empty ones. Beyond the end of the bytes all are empty, and sound() is false.
+  explicit ByteArchive(std::span<const std::byte> bytes) : rest_(bytes) {}
+
   template <class... T>
   void operator()(T&... values) {
-    (put(values), ...);
-  }
-
- private:
-  template <PlainValue T>
-  void put(T value) {
-    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
-    out_.insert(out_.end(), bytes, bytes + sizeof(T));
-  }
-  void put(const std::string& text) {
-    put(std::uint64_t{text.size()});
-    const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
-    out_.insert(out_.end(), bytes, bytes + text.size());
-  }
-  template <class T>
-  void put(std::optional<T>& value) {
-    put(value.has_value());
-    if (value) put(*value);
-  }
-  template <class T, std::size_t n>
-  void put(std::array<T, n>& values) {
-    for (T& value : values) put(value);
-  }
-  template <class T>
-  void put(std::vector<T>& values) {
-    put(std::uint64_t{values.size()});
-    for (T& value : values) put(value);
-  }
-  template <class T>
-  void put(std::map<std::string, T>& values) {
-    put(std::uint64_t{values.size()});
-    for (auto& [name, value] : values) {
-      put(name);
-      put(value);
-    }
-  }
-  template <class T>
-  requires(std::is_class_v<T> && !std::same_as<std::remove_const_t<T>, std::string>) void put(T& value) {
-    Members::of(*this, value);
-  }
-
-  std::vector<std::byte>& out_;
-};
-
-// Beyond the end of the bytes all values read as empty, and sound() is false.
-template <class Members>
-class ByteLoader {
- public:
-  explicit ByteLoader(std::span<const std::byte> bytes) : rest_(bytes) {}
-  template <class... T>
-  void operator()(T&... values) {
-    (get(values), ...);
+    (pass(values), ...);
   }
   bool sound() const { return sound_; }
   bool at_end() const { return rest_.empty(); }
 
  private:
-  bool take(void* into, std::size_t size) {
+  void pass_bytes(void* value, std::size_t size) {
+    if (out_ != nullptr) {
+      const auto* bytes = static_cast<const std::byte*>(value);
+      out_->insert(out_->end(), bytes, bytes + size);
+      return;
+    }
     sound_ = sound_ && size <= rest_.size();
-    if (!sound_) return false;
-    if (size > 0) std::memcpy(into, rest_.data(), size);
+    if (!sound_ || size == 0) return;
+    std::memcpy(value, rest_.data(), size);
     rest_ = rest_.subspan(size);
-    return true;
   }
   // Of things that take a byte each at least.
-  std::size_t count() {
-    std::uint64_t number = 0;
-    if (!take(&number, sizeof(number)) || number > rest_.size()) {
-      sound_ = false;
-      return 0;
-    }
-    return number;
+  std::size_t pass_count(std::uint64_t number) {
+    pass_bytes(&number, sizeof(number));
+    sound_ = sound_ && (out_ != nullptr || number <= rest_.size());
+    return sound_ ? number : 0;
   }
-  // A failure of take() is recorded in sound_.
   template <PlainValue T>
-  void get(T& value) {
+  void pass(T& value) {
     if constexpr (std::same_as<T, bool>) {
-      std::uint8_t byte = 0;
-      (void)take(&byte, 1);
+      std::uint8_t byte = value ? 1 : 0;
+      pass_bytes(&byte, 1);
       value = byte != 0;
     } else {
-      (void)take(&value, sizeof(T));
+      pass_bytes(&value, sizeof(T));
     }
   }
-  void get(std::string& text) {
-    text.resize(count());
-    (void)take(text.data(), text.size());
+  void pass(std::string& text) {
+    text.resize(pass_count(text.size()));
+    pass_bytes(text.data(), text.size());
   }
   template <class T>
-  void get(std::optional<T>& value) {
-    bool there = false;
-    get(there);
-    if (there && sound_) get(value.emplace());
+  void pass(std::optional<T>& value) {
+    bool there = value.has_value();
+    pass(there);
+    if (there && sound_) pass(value ? *value : value.emplace());
   }
   template <class T, std::size_t n>
-  void get(std::array<T, n>& values) {
-    for (T& value : values) get(value);
+  void pass(std::array<T, n>& values) {
+    for (T& value : values) pass(value);
   }
   template <class T>
-  void get(std::vector<T>& values) {
-    for (std::size_t left = count(); left > 0 && sound_; --left) get(values.emplace_back());
+  void pass(std::vector<T>& values) {
+    const std::size_t count = pass_count(values.size());
+    for (std::size_t k = 0; k < count && sound_; ++k)
+      pass(k < values.size() ? values[k] : values.emplace_back());
   }
   template <class T>
-  void get(std::map<std::string, T>& values) {
-    for (std::size_t left = count(); left > 0 && sound_; --left) {
-      std::string name;
-      get(name);
-      get(values[name]);
+  void pass(std::map<std::string, T>& values) {
+    auto next = values.begin();
+    for (std::size_t left = pass_count(values.size()); left > 0 && sound_; --left) {
+      std::string name = next == values.end() ? "" : (next++)->first;
+      pass(name);
+      pass(values[name]);
     }
   }
   template <class T>
-  requires(std::is_class_v<T> && !std::same_as<T, std::string>) void get(T& value) {
+  requires(std::is_class_v<T> && !std::same_as<T, std::string>) void pass(T& value) {
     Members::of(*this, value);
   }
 
+  std::vector<std::byte>* out_ = nullptr;
   std::span<const std::byte> rest_;
   bool sound_ = true;
 };

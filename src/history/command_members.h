@@ -14,7 +14,7 @@ concept Stored = requires(Record& record) {
   visit_columns(record, [](const auto&...) {});
 };
 
-// The members of commands and all that they hold, for the archives of base/byte_archive.h and for
+// The members of commands and all that they hold, for the archive of base/byte_archive.h and for
 // weight_bytes(): of a record its columns, else the members in their order. Numbers of members that of() does
 // not list do not compile.
 struct CommandMembers : signals::ArchiveMembers {

@@ -19,8 +19,7 @@
 namespace joulecast::history {
 namespace {
 
-using Saver = ByteSaver<CommandMembers>;
-using Loader = ByteLoader<CommandMembers>;
+using Archive = ByteArchive<CommandMembers>;
 
 // The header of a file: layouts differ in the size of one of their types.
 std::string layout() {
@@ -34,7 +33,7 @@ std::string layout() {
 }
 
 template <std::size_t... index>
-void get_command(Loader& load, std::size_t kind, Command& command, std::index_sequence<index...>) {
+void get_command(Archive& load, std::size_t kind, Command& command, std::index_sequence<index...>) {
   ((kind == index ? load(command.emplace<index>()) : void()), ...);
 }
 
@@ -81,7 +80,7 @@ Result<void> write_whole(const std::string& path, const Bytes& bytes) {
 
 Bytes command_bytes(std::span<const Command* const> commands) {
   Bytes plain;
-  Saver save(plain);
+  Archive save(&plain);
   std::size_t count = commands.size();
   save(count);
   for (const Command* command : commands) {
@@ -94,7 +93,7 @@ Bytes command_bytes(std::span<const Command* const> commands) {
 }
 
 std::optional<std::vector<Command>> commands_of(std::span<const std::byte> bytes) {
-  Loader load(bytes);
+  Archive load(bytes);
   std::size_t count = 0;
   load(count);
   std::vector<Command> commands;

@@ -69,14 +69,13 @@ struct Members : signals::ArchiveMembers {
   }
 };
 
-using Saver = ByteSaver<Members>;
-using Loader = ByteLoader<Members>;
+using Archive = ByteArchive<Members>;
 
 }  // namespace
 
 std::vector<std::byte> snapshot_bytes(const RobotSnapshot& snapshot) {
   std::vector<std::byte> bytes;
-  Saver save(bytes);
+  Archive save(&bytes);
   std::uint32_t version = layout;
   RobotSnapshot copy = snapshot;
   save(version, copy);
@@ -84,7 +83,7 @@ std::vector<std::byte> snapshot_bytes(const RobotSnapshot& snapshot) {
 }
 
 std::shared_ptr<const RobotSnapshot> snapshot_from_bytes(std::span<const std::byte> bytes) {
-  Loader load(bytes);
+  Archive load(bytes);
   std::uint32_t version = 0;
   load(version);
   if (version != layout) return nullptr;

@@ -5,7 +5,7 @@
 
 namespace joulecast::signals {
 
-// The members of samples and accounts, for the archives of base/byte_archive.h; `Members` of a program that
+// The members of samples and accounts, for the archive of base/byte_archive.h; `Members` of a program that
 // holds them take these over by `using ArchiveMembers::of`.
 struct ArchiveMembers {
   template <class Archive>
