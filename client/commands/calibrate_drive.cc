@@ -25,6 +25,11 @@
 #include "telemetry/recording_climb.h"
 #include "telemetry/recording_set.h"
 
+namespace joulecast::energy {
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DriveCalibration, blocks, windows, slowest_rad_s, fastest_rad_s,
+                                   voltage_rms_v, torque_rms_nm, electrical_delay_s)
+}  // namespace joulecast::energy
+
 namespace joulecast::client {
 namespace {
 
@@ -190,16 +195,6 @@ Result<DriveOutcome> calibrate(const CalibrateDriveOptions& options) {
   return outcome;
 }
 
-void add_block(Json& document, const energy::DriveCalibration& fit) {
-  document["blocks"] = fit.blocks;
-  document["windows"] = fit.windows;
-  document["slowest_rad_s"] = fit.slowest_rad_s;
-  document["fastest_rad_s"] = fit.fastest_rad_s;
-  document["voltage_rms_v"] = json_number(fit.voltage_rms_v);
-  document["torque_rms_nm"] = json_number(fit.torque_rms_nm);
-  document["electrical_delay_s"] = fit.electrical_delay_s;
-}
-
 void add_block(Json& document, const energy::PowerCalibration& fit) {
   document["blocks"] = fit.blocks;
   document["windows"] = fit.windows;
@@ -256,7 +251,7 @@ Json drive_json(const DriveOutcome& outcome) {
                 {"method", outcome.method},
                 {"parameters", Json::array()},
                 {"missions", Json::array()}};
-  outcome.by_motors ? add_block(document, *outcome.by_motors) : add_block(document, *outcome.by_power);
+  outcome.by_motors ? document.update(*outcome.by_motors) : add_block(document, *outcome.by_power);
   // Deviations of the parameters that battery power does not identify are reported too.
   const bool always = outcome.by_power.has_value();
   for (const energy::ParameterEstimate& e : outcome.estimates())

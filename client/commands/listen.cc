@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/json_number.h"
 #include "base/try.h"
 #include "client/interrupt.h"
 #include "telemetry/codec.h"
@@ -16,16 +16,12 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json number_or_null(double value) {
-  return std::isfinite(value) ? Json(value) : Json();
-}
-
 Json field_json(const telemetry::FieldTally& field, std::uint64_t messages, double rate_hz) {
   const double share = messages > 0 ? 1.0 / static_cast<double>(messages) : 0;
   return {{"name", field.name},
-          {"last", number_or_null(field.last)},
-          {"least", number_or_null(field.least)},
-          {"greatest", number_or_null(field.greatest)},
+          {"last", json_number(field.last)},
+          {"least", json_number(field.least)},
+          {"greatest", json_number(field.greatest)},
           {"measured", field.measured},
           {"change_rate_hz", rate_hz * static_cast<double>(field.changes) * share}};
 }
