@@ -49,8 +49,9 @@ Result<std::vector<std::optional<std::size_t>>> positions(std::string_view heade
   std::vector<std::optional<std::size_t>> found(columns);
   for (std::size_t c = 0; c < columns; ++c) {
     for (const std::string_view name : column_names[c]) {
-      const auto at = std::ranges::find_if(
-          cells, [&](std::string_view cell) { return boost::algorithm::iequals(cell, name); });
+      const auto at = std::ranges::find_if(cells, [&](std::string_view cell) {
+        return !cell.empty() && boost::algorithm::iequals(cell, name);
+      });
       if (at == cells.end()) continue;
       found[c] = static_cast<std::size_t>(at - cells.begin());
       break;
