@@ -10,10 +10,7 @@ const here = path.dirname(fileURLToPath(import.meta.url));
 const firstLoad = ['index.html', 'app.js', 'base.js', 'app.css', 'favicon.svg'];
 const limits = {
   'first load': [firstLoad, 26_000],
-  'other views': [['views.js', 'shared.js', 'views.css'], 50_000],
-  map: [['map.js'], 15_000],
-  administration: [['admin.js'], 15_000],
-  gap: [['gap.js'], 15_000],
+  'other views': [['views.js', 'views.css'], 65_000],
   report: [['report.template'], 60_000],
   charts: [['uplot.js'], 24_000],
 };
@@ -25,14 +22,10 @@ const options = {
     { in: 'source/views/index.js', out: 'views' },
     // Not by an import of index.js, which would put it into app.css, too.
     { in: 'source/views/views.css', out: 'views' },
-    { in: 'source/gap/index.js', out: 'gap' },
-    { in: 'source/map/index.js', out: 'map' },
-    { in: 'source/admin/index.js', out: 'admin' },
     { in: 'source/uplot.js', out: 'uplot' },
   ],
   splitting: true,
-  chunkNames: 'chunk-[hash]',
-  metafile: true,
+  chunkNames: 'base', // one file of the modules that the first load and the views share
   outdir: here,
   bundle: true,
   minify: true,
@@ -58,17 +51,6 @@ async function thirdParty() {
   return parts.join('\n');
 }
 
-// The names of the two files of shared modules, from those that esbuild gave them.
-function sharedNames({ outputs }) {
-  const chunks = Object.keys(outputs).filter((name) => name.startsWith('chunk-'));
-  const names = chunks.map((name) => ('source/api.js' in outputs[name].inputs ? 'base.js' : 'shared.js'));
-  if (chunks.length !== new Set(names).size)
-    throw new Error(
-      `shared by some parts only: ${chunks.map((name) => Object.keys(outputs[name].inputs)).join('; ')}`,
-    );
-  return new Map(chunks.map((name, k) => [name, names[k]]));
-}
-
 // The page of reports: one file, in which the writer replaces @DATA@ by a diagnosis.
 async function reportTemplate() {
   const { outputFiles } = await build({
@@ -86,12 +68,8 @@ async function reportTemplate() {
 }
 
 async function products() {
-  const { outputFiles, metafile } = await build(options);
-  const renamed = sharedNames(metafile);
-  const inAll = (text) => [...renamed].reduce((of, [from, to]) => of.replaceAll(from, to), text);
-  const files = new Map(
-    outputFiles.map((file) => [inAll(path.basename(file.path)), Buffer.from(inAll(file.text))]),
-  );
+  const { outputFiles } = await build(options);
+  const files = new Map(outputFiles.map((file) => [path.basename(file.path), Buffer.from(file.contents)]));
   for (const name of ['index.html', 'favicon.svg']) files.set(name, await readFile(path.join(here, name)));
   files.set('third_party.txt', Buffer.from(await thirdParty()));
   files.set('report.template', Buffer.from(await reportTemplate()));

@@ -36,12 +36,26 @@ export function axis(label, more = {}) {
 const minute = 60;
 const hours = 3600;
 const day = 86_400;
-export const clockSteps = [
+const clockSteps = [
   [1, [1, 2, 5, 10, 15, 30]],
   [minute, [1, 2, 5, 10, 15, 30]],
   [hours, [1, 2, 3, 6, 12]],
   [day, [1, 2, 7, 14, 28, 91, 182, 364, 728, 1820]],
 ].flatMap(([unit, counts]) => counts.map((k) => k * unit));
+
+// Seconds since the start: 1:30, 1:02:05.
+const runClock = (_, splits) =>
+  splits.map((s) => {
+    if (s === null) return '';
+    const sign = s < 0 ? '−' : '';
+    const t = Math.abs(s);
+    const two = (v) => String(Math.floor(v)).padStart(2, '0');
+    const hours = t < 3600 ? '' : `${Math.floor(t / 3600)}:`;
+    const minutes = t < 3600 ? Math.floor(t / 60) : two((t % 3600) / 60);
+    return `${sign}${hours}${minutes}:${two(t % 60)}`;
+  });
+
+export const runAxis = (label) => axis(label, { size: 28, incrs: clockSteps, values: runClock });
 
 // Local times, with the day where it changes, of a scale of times.
 const dayChange = '\n{YYYY}-{MM}-{DD}';

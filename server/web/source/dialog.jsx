@@ -1,6 +1,7 @@
 // A dialog that is shown while `open`, with buttons to confirm, by `onSubmit(values of its fields by name)`,
 // and to cancel; `onClose` when it is closed in any way.
-import { useEffect, useRef } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { Button } from './widgets.jsx';
 
 export function Dialog({ open, title, action, onSubmit, onClose, children, ...more }) {
   const dialog = useRef(null);
@@ -30,5 +31,25 @@ export function Dialog({ open, title, action, onSubmit, onClose, children, ...mo
         </form>
       )}
     </dialog>
+  );
+}
+
+// A button with a dialog that confirms its action by `onConfirm(values of its fields by name)`. Its children
+// describe the change; the others are of the button.
+export function ConfirmButton({ label, title, action = label, onConfirm, children, ...button }) {
+  const [open, setOpen] = useState(false);
+  const confirm = (values) => {
+    setOpen(false);
+    onConfirm(values);
+  };
+  return (
+    <>
+      <Button {...button} onClick={() => setOpen(true)}>
+        {label}
+      </Button>
+      <Dialog open={open} title={title} action={action} onSubmit={confirm} onClose={() => setOpen(false)}>
+        {children}
+      </Dialog>
+    </>
   );
 }

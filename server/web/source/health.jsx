@@ -1,6 +1,21 @@
-// Texts of a robot's telemetry and charge, for the fleet and its own page.
+// The robots that need attention, and texts of a robot's telemetry and charge.
+import { get, useRenewed } from './api.js';
 import * as format from './format.js';
 import { Quantity } from './widgets.jsx';
+
+const attentionMs = 10_000;
+
+async function readAttention(signal) {
+  const { attention } = await get('/v1/attention', signal);
+  return new Map(attention.map((entry) => [entry.robot_id ?? '', entry]));
+}
+
+// Map from robot to {severity, acknowledged, reasons}; the service itself is under ''. Empty until it is
+// read; read again when `turn` changes.
+export const useAttention = (turn = 0) => useRenewed(readAttention, attentionMs, `all${turn}`);
+
+// Whether an entry, absent for most robots, has a reason that no one acknowledged.
+export const needsSomeone = (entry) => entry !== undefined && !entry.acknowledged;
 
 export const lowCharge = 0.25;
 

@@ -15,17 +15,17 @@ import { later } from './views/later.jsx';
 const views = {
   fleet: Fleet,
   robots: later('Robot'),
-  'robot-file': later('RobotFile', 'admin'),
+  'robot-file': later('RobotFile'),
   missions: later('Missions'),
   mission: later('Mission'),
   trends: later('Trends'),
-  map: later('FloorLive', 'map'),
+  map: later('FloorLive'),
   floor: later('Floor'),
   plan: later('Plan'),
-  gap: later('Gap', 'gap'),
+  gap: later('Gap'),
   audit: later('Audit'),
-  cluster: later('Cluster', 'admin'),
-  help: later('Help', 'admin'),
+  cluster: later('Cluster'),
+  help: later('Help'),
 };
 
 const tabs = Object.entries({

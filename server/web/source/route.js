@@ -1,3 +1,4 @@
+import { useState } from 'preact/hooks';
 import { query } from './api.js';
 
 // "#/missions/12" -> view mission, id 12; "#/missions?state=open" -> view missions, given {state: 'open'}.
@@ -23,4 +24,16 @@ export const missionLink = (id) => `#/missions/${id}`;
 export function keepInAddress(values) {
   const [path] = location.hash.split('?');
   history.replaceState(null, '', `${path || '#/fleet'}${query(values)}`);
+}
+
+// The parameters of a view in its address, and a function that changes some of them; an empty value removes a
+// parameter.
+export function useChoices(asked) {
+  const [given, setGiven] = useState(asked);
+  const change = (part) => {
+    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
+    setGiven(next);
+    keepInAddress(next);
+  };
+  return [given, change];
 }

@@ -2,7 +2,7 @@
 // confirmation.
 import { useState } from 'preact/hooks';
 import { idPath, useGet } from '../api.js';
-import { ConfirmButton } from '../confirm.jsx';
+import { ConfirmButton } from '../dialog.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { Failure } from '../widgets.jsx';

@@ -4,8 +4,14 @@ import * as format from '../format.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
 import { unitOf } from './changes.jsx';
-import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
-import { Comparison, Runs } from './diagnosis_kinds.jsx';
+import {
+  Comparison,
+  Conditions,
+  FloorFigure,
+  MissionFigures,
+  PowerFigure,
+  Runs,
+} from './diagnosis_figures.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdictTitle } from './jobs.jsx';
 
 const channels = {

@@ -1,16 +1,24 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import { needsSomeone, useAttention } from '../attention.js';
-import { useChoices } from '../choices.js';
+import { get, query, useRenewed } from '../api.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
 import * as format from '../format.js';
-import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
+import {
+  Charge,
+  Health,
+  Reasons,
+  between,
+  lowCharge,
+  needsSomeone,
+  now,
+  unheard,
+  useAttention,
+} from '../health.jsx';
 import { showRecent, useLive, useModelled } from '../live.js';
 import { useRatios } from '../ratios.js';
-import { missionLink, robotLink } from '../route.js';
+import { missionLink, robotLink, useChoices } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Cells, Head, SortChoice, column, names, sorted, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
-import { useToday } from '../today.js';
 import {
   Button,
   Choice,
@@ -29,6 +37,8 @@ const rowPx = 50;
 const cardPx = 158; // with the space below it, as in the style sheet
 const spareRows = 8;
 const reorderMs = 3000;
+const todayMs = 60_000;
+const weekMs = 7 * 86_400_000;
 
 const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
 const speedNow = ({ state }) => now(state, state.speed_m_s);
@@ -204,6 +214,23 @@ function totalsOf(robots) {
   }
   return t;
 }
+
+// Energy of today and, until the same time of day, of the same weekday a week ago.
+async function readToday(signal) {
+  const midnight = new Date().setHours(0, 0, 0, 0);
+  const sums = ([from, to]) =>
+    get(`/v1/mission-totals${query({ from_utime_us: from * 1000, to_utime_us: to * 1000 })}`, signal);
+  const [today, before] = await Promise.all(
+    [
+      [midnight, Date.now()],
+      [midnight - weekMs, Date.now() - weekMs],
+    ].map(sums),
+  );
+  return new Map(Object.entries({ today, before }));
+}
+
+// Map with `today` and `before`, totals of missions that began then; empty until they are read.
+const useToday = () => useRenewed(readToday, todayMs, 'today');
 
 // Today's energy, its consumption, and its change against the same weekday a week ago, as a row of Readouts.
 function useTodayRow() {

@@ -1,11 +1,9 @@
 // The fleet's energy by place on the floor over weeks, and its departure from the models.
 import { useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale } from '../energy.js';
-import { Export } from '../export_buttons.jsx';
-import { saveText } from '../export.js';
 import * as format from '../format.js';
+import { useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import {
@@ -20,6 +18,7 @@ import {
   useTitleOf,
 } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, SelectField, fieldsOf, misordered, timesOf } from './choosing.jsx';
+import { Export, saveText } from './export.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 
 const usualDays = 28;

@@ -1,8 +1,12 @@
-import '../shared.js';
 export { Audit } from './audit.jsx';
+export { Cluster } from './cluster.jsx';
 export { Floor } from './floor_map.jsx';
+export { FloorLive } from './map.jsx';
+export { Gap } from './gap.jsx';
+export { Help } from './help.jsx';
 export { Mission } from './mission.jsx';
 export { Missions } from './missions.jsx';
 export { Plan } from './plan.jsx';
 export { Robot } from './robot.jsx';
+export { RobotFile } from './robot_file.jsx';
 export { Trends } from './trends.jsx';

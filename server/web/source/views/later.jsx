@@ -1,26 +1,8 @@
-// Views in separate files, each of which is loaded when a view of it is first shown.
-import { useEffect, useState } from 'preact/hooks';
-import { Failure, Loading } from '../widgets.jsx';
+// The views apart from the fleet, which are loaded when the first of them is shown.
+import { useRead } from '../api.js';
+import { Answer } from '../widgets.jsx';
 
-const files = {
-  views: () => import('./index.js'),
-  gap: () => import('../gap/index.js'),
-  map: () => import('../map/index.js'),
-  admin: () => import('../admin/index.js'),
-};
-const asked = {};
-const present = {};
-
-function load(file) {
-  asked[file] ??= Promise.all([files[file](), (asked.style ??= loadStyle())]).then(
-    ([module]) => (present[file] = module),
-    (error) => {
-      asked[file] = asked.style = undefined;
-      throw error;
-    },
-  );
-  return asked[file];
-}
+let views = null;
 
 function loadStyle() {
   const link = Object.assign(document.createElement('link'), { rel: 'stylesheet', href: 'views.css' });
@@ -29,31 +11,21 @@ function loadStyle() {
   return loaded;
 }
 
-const unreachable = {
-  status: 0,
-  title: 'This part of the page could not be loaded',
-  message: 'The service may be restarting, or the network is down.',
-};
-
-function Later({ part, file, ...rest }) {
-  const [, setTurn] = useState(0);
-  const [error, setError] = useState(null);
-  const retry = () => {
-    setError(null);
-    load(file).then(
-      () => setTurn((n) => n + 1),
-      () => setError(unreachable),
-    );
-  };
-  useEffect(() => {
-    if (!present[file]) retry();
-  }, []);
-  if (error !== null) return <Failure error={error} retry={retry} />;
-  if (!present[file]) return <Loading what="this part of the page" />;
-  const Part = present[file][part];
-  return <Part {...rest} />;
+async function load() {
+  try {
+    [views] = await Promise.all([import('./index.js'), loadStyle()]);
+  } catch {
+    throw Object.assign(new Error('The service may be restarting, or the network is down.'), {
+      title: 'This part of the page could not be loaded',
+    });
+  }
 }
 
-export const later =
-  (part, file = 'views') =>
-  (props) => <Later part={part} file={file} {...props} />;
+function Later({ part, ...props }) {
+  const loading = useRead(load, views ? null : 'views');
+  if (views === null) return <Answer of={loading} what="this part of the page" />;
+  const View = views[part];
+  return <View {...props} />;
+}
+
+export const later = (part) => (props) => <Later part={part} {...props} />;

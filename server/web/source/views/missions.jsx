@@ -1,16 +1,15 @@
 import { useMemo } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { useChoices } from '../choices.js';
 import { consumption, energy } from '../energy.js';
-import { Export } from '../export_buttons.jsx';
-import { exportMissions } from '../export.js';
 import * as format from '../format.js';
+import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';
 import { useModels } from '../models.js';
 import { SortChoice, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Button, Empty, Failure, Readouts, missionStates, useTitleOf } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
+import { Export, exportMissions } from './export.jsx';
 import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;

@@ -1,10 +1,9 @@
 // Every stored sample of the motors and the battery, over the whole mission or the part that is zoomed to.
 import { useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { Chart, axis, clockSteps, line } from '../chart.jsx';
+import { Chart, axis, line, runAxis } from '../chart.jsx';
 import { palette } from '../theme.js';
 import { Answer, Button, Choice, Empty, Key, Panel } from '../widgets.jsx';
-import { runClock } from './clock.js';
 
 const mostSamples = 20_000;
 const mostS = 400; // at 50 Hz
@@ -28,10 +27,7 @@ function Sides({ telemetry, mission, quantity }) {
   const make = () => {
     const p = palette();
     return {
-      axes: [
-        axis('time since the start', { size: 28, incrs: clockSteps, values: runClock }),
-        axis(label, { size: 56 }),
-      ],
+      axes: [runAxis('time since the start'), axis(label, { size: 56 })],
       series: [{}, line(p.accent, 1.25), line(p.measured, 1.25)],
     };
   };

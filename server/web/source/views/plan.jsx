@@ -19,8 +19,7 @@ import { Button, Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '..
 import { DrawPath } from './draw.jsx';
 import { Front, SpeedChart } from './plan_charts.jsx';
 import { PlanForm } from './plan_form.jsx';
-import { Baselines, Certificate } from './plan_panels.jsx';
-import { PlanVerdict } from './plan_verdict.jsx';
+import { Baselines, Certificate, PlanVerdict } from './plan_panels.jsx';
 
 const frontPoints = 24;
 const firstLegs = 'straight:6,turn:90,straight:4';

@@ -1,11 +1,110 @@
-// The panels of a plan: its certificate, and the energy of usual profiles.
-import { get, idPath, useRead } from '../api.js';
+// The panels of a plan: whether the charge suffices, its certificate, and the energy of usual profiles.
+import { get, idPath, post, useRead } from '../api.js';
 import { EnergyBars } from '../bars.jsx';
-import { withinLimits } from '../baselines.js';
-import { energy } from '../energy.js';
+import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
+import { Table, column, figure } from '../table.jsx';
 import { Facts, Failure } from '../widgets.jsx';
 import { priceOfHaste } from './plan_charts.jsx';
+
+// A probability, with meaningful digits only.
+function chance(p) {
+  if (p > 0.999) return 'more than 99.9\u00a0%';
+  if (p < 0.001) return 'less than 0.1\u00a0%';
+  return format.share(p, p > 0.99 || p < 0.01 ? 1 : 0);
+}
+
+const verdicts = [
+  [0.95, 'The charge suffices', 'makes'],
+  [0.5, 'The charge probably suffices', 'maybe'],
+  [0.05, 'The charge probably does not suffice', 'fails'],
+  [-1, 'The charge does not suffice', 'fails'],
+];
+
+const bases = {
+  recent_missions: ({ missions }) => `its ${missions === 1 ? 'last mission' : `last ${missions} missions`}`,
+  siblings: ({ siblings }) => `missions of ${format.count(siblings, 'robot')} of its kind`,
+  model: () => 'its model alone: it has no missions yet',
+};
+
+const percent = (value) => format.share(value, 1);
+
+// The median and, unless it is certain, the central 90 %.
+function arrivalOf({ p05, p50, p95 }) {
+  if (percent(p05) === percent(p95)) return percent(p50);
+  return `${format.share(p50)} (${format.fixed(100 * p05)}–${format.share(p95)})`;
+}
+
+function Drives({ drives }) {
+  const long = { class: 'figure long' };
+  const scale = energyScale(drives.map((d) => d.expected_energy_j));
+  const columns = [
+    column('name', 'Drive', (d) => d.name, { head: true }),
+    figure('chance', 'Chance', (d) => chance(d.success_probability), long),
+    figure('energy', 'Expected energy', (d) => energyIn(scale, d.expected_energy_j), long),
+    figure('time', 'Time', (d) => format.about(d.duration_s), long),
+    figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), long),
+  ];
+  return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;
+}
+
+function Explanation({ answer, autonomy: a, planned }) {
+  const reasons = [
+    `it is a forecast from ${bases[a.consumption.basis](a.consumption)}`,
+    a.pace.pause_s > 0.05 &&
+      `it includes the usual pause of ${format.fixed(a.pace.pause_s, 1)} s at each stop`,
+  ].filter(Boolean);
+  return (
+    <p class="note">
+      Least energy ({format.text(energy(answer.energy_j))}) is the model’s optimum for this path. The expected
+      energy
+      {planned && ` (${format.text(energy(planned.expected_energy_j))})`} is what the robot will probably use:{' '}
+      {reasons.join(', and ')}.
+    </p>
+  );
+}
+
+function drivesOf({ plan: usual, minimum_energy: planned, consumption }) {
+  const who = consumption.missions > 0 ? 'it usually drives' : 'robots usually drive';
+  return [
+    planned && { ...planned, name: 'As planned here', arrival: planned.arrival_charge },
+    { ...usual, name: `As ${who}`, arrival: usual.legs[0].arrival_charge },
+  ].filter(Boolean);
+}
+
+export function PlanVerdict({ answer, autonomy }) {
+  if (autonomy.error !== null) return <Failure error={autonomy.error} />;
+  if (autonomy.value === null)
+    return (
+      <p class="verdict open">
+        {autonomy.busy
+          ? 'Computing whether the charge suffices …'
+          : 'The robot has not reported its charge: enter it to see whether it suffices.'}
+      </p>
+    );
+  const a = autonomy.value;
+  const drives = drivesOf(a);
+  const [first] = drives;
+  const [, words, name] = verdicts.find(([least]) => first.success_probability >= least);
+  const times = first.expected_energy_j > 0 ? Math.floor(a.usable_energy_j / first.expected_energy_j) : 0;
+  const sd = a.state_of_charge_sd > 0.0005 ? ` ± ${percent(a.state_of_charge_sd)}` : '';
+  return (
+    <div class={`verdict-box ${name}`}>
+      <p class="verdict">
+        <b>{words}</b>: {chance(first.success_probability)} chance to finish with its reserve of{' '}
+        {format.share(a.reserve_fraction)} left.
+      </p>
+      <Drives drives={drives} />
+      <p class="note">
+        Starts with {percent(a.state_of_charge)}
+        {sd} charge, {format.text(energy(a.usable_energy_j))} usable
+        {times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}.{' '}
+        {a.state_of_charge_limitation}
+      </p>
+      <Explanation answer={answer} autonomy={a} planned={a.minimum_energy} />
+    </div>
+  );
+}
 
 const methods = {
   closed_form: 'closed-form formulas',
@@ -35,6 +134,57 @@ export function Certificate({ answer }) {
     ['Model', `version ${answer.model_version}`],
   ];
   return <Facts rows={rows} />;
+}
+
+// The usual speed profiles, for comparison with the plan. A profile that exceeds the robot's limits in the
+// plan's duration is slowed down until it satisfies them; its energy is that of the slower profile.
+
+// Multiples of the factor that speed and acceleration require.
+const slower = [1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2];
+const standing = 1e-6;
+
+// The factor of time by which speed, acceleration and yaw rate come within their limits.
+function leastFactor({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, limits) {
+  let factor = 1;
+  for (let k = 0; k < t.length; ++k) {
+    factor = Math.max(factor, Math.abs(v[k]) / limits.speed_m_s, Math.abs(w[k]) / limits.yaw_rate_rad_s);
+    if (k === 0 || t[k] <= t[k - 1]) continue;
+    const acceleration = Math.abs(v[k] - v[k - 1]) / (t[k] - t[k - 1]);
+    factor = Math.max(factor, Math.sqrt(acceleration / limits.acceleration_m_s2));
+  }
+  return factor;
+}
+
+// The same way in `factor` times the time; stops last as long as before.
+function slowed({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, factor) {
+  const stands = (k) => Math.abs(v[k]) < standing && Math.abs(w[k]) < standing;
+  const rows = [[t[0], v[0], w[0]]];
+  for (let k = 1; k < t.length; ++k) {
+    if (t[k] <= t[k - 1]) continue; // both sides of a corner
+    const pace = stands(k) && stands(k - 1) ? 1 : factor;
+    rows.push([rows[rows.length - 1][0] + (t[k] - t[k - 1]) * pace, v[k], w[k]]);
+  }
+  return {
+    time_s: rows.map(([at]) => at),
+    speed_m_s: rows.map(([, speed]) => speed / factor),
+    yaw_rate_rad_s: rows.map(([, , rate]) => rate / factor),
+  };
+}
+
+// {energyJ, durationS, slowed} of a baseline within the limits; null if none exists.
+async function withinLimits(baseline, { robotId, limits, payloadKg, mayScale, signal }) {
+  if (!baseline) return null;
+  if (baseline.within_limits)
+    return { energyJ: baseline.energy_j, durationS: baseline.duration_s, slowed: false };
+  if (!mayScale) return null;
+  const least = leastFactor(baseline.profile, limits);
+  for (const more of slower) {
+    const body = { profile: slowed(baseline.profile, least * more), payload_kg: payloadKg };
+    const priced = await post(`/v1/robots/${idPath(robotId)}/estimate`, body, signal);
+    if (priced.beyond_limits.length === 0)
+      return { energyJ: priced.energy_j, durationS: priced.duration_s, slowed: true };
+  }
+  return null;
 }
 
 async function readBaselines({ robot_id: robotId, baselines }, request, signal) {

@@ -1,21 +1,21 @@
 import { useEffect, useState } from 'preact/hooks';
-import { idPath, query, useGet } from '../api.js';
-import { useAttention } from '../attention.js';
+import { idPath, post, query, useGet } from '../api.js';
+import { ConfirmButton } from '../dialog.jsx';
 import { energy } from '../energy.js';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
-import { Health, Reasons, between, chargeNote, now, since, unheard } from '../health.jsx';
+import { Health, Reasons, between, chargeNote, now, since, unheard, useAttention } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Button, Empty, Facts, Failure, Heading, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
-import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
+import { Field } from './choosing.jsx';
 import { Events, useEvents } from './events.jsx';
 import { ownPart } from './fleet.jsx';
 import { MissionTable } from './mission_rows.jsx';
-import { Proposals } from './proposals.jsx';
 import { RobotHistory } from './robot_history.jsx';
+import { Proposals } from './robot_models.jsx';
 
 const recentRows = 12;
 const recentEvents = 12;
@@ -156,6 +156,34 @@ function RecentEvents({ id }) {
         {(rows) => <Events events={rows} withRobot={false} />}
       </List>
     </Panel>
+  );
+}
+
+// The acknowledgement of a reason for attention, or the button for it.
+function Acknowledge({ robot, reason, onChange, onError }) {
+  const { kind, acknowledged: by } = reason;
+  if (by)
+    return (
+      <span class="note">
+        Acknowledged{by.by ? ` by ${by.by}` : ''} {format.time(by.utime_us).slice(0, 16)}
+        {by.note && `: ${by.note}`}
+      </span>
+    );
+  const send = ({ note }) =>
+    post(`/v1/robots/${idPath(robot)}/acknowledge`, { kind, note }).then(onChange, onError);
+  return (
+    <ConfirmButton
+      class="plain"
+      label="Acknowledge"
+      title={`Acknowledge: ${format.words(kind)}`}
+      needs="operate"
+      onConfirm={send}
+    >
+      <p>{reason.message} It no longer counts as needing attention until this condition ends.</p>
+      <Field label="Note">
+        <input type="text" name="note" maxlength="250" />
+      </Field>
+    </ConfirmButton>
   );
 }
 

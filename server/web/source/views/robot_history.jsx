@@ -1,14 +1,15 @@
 // A robot's gap over its missions, its model versions, and robots of its kind.
-import { useMemo } from 'preact/hooks';
+import { useMemo, useState } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
+import { Bars } from '../bars.jsx';
 import { Chart, axis, clockAxis, line, timesWith } from '../chart.jsx';
 import { strokeThrough } from '../floor.jsx';
 import * as format from '../format.js';
+import { robotLink } from '../route.js';
 import { palette } from '../theme.js';
-import { Answer, Empty, Key, List, Panel } from '../widgets.jsx';
+import { Answer, Button, Empty, Key, List, Panel } from '../widgets.jsx';
 import { JobRows, share } from './jobs.jsx';
-import { Siblings } from './siblings.jsx';
-import { Versions } from './versions.jsx';
+import { Versions } from './robot_models.jsx';
 
 const medianMissions = 9;
 
@@ -107,6 +108,64 @@ function RatioChart({ history }) {
         now <b>{format.fixed(last, 3)}</b>; solid vertical lines: new model versions; dashed:{' '}
         {drift.length === 0 ? 'drifts (none)' : format.count(drift.length, 'drift')}.
       </p>
+    </>
+  );
+}
+
+// Of the ratios of robots of one kind: this robot, the outlying robots and those with the largest departures,
+// in the order of the service.
+const mostSiblings = 12;
+function chosenOf(siblings, id) {
+  const off = (s) =>
+    s.robot_id === id ? Infinity : (s.stands_out ? 1 : 0) + Math.min(0.9, Math.abs(s.ratio - 1));
+  const kept = new Set([...siblings].sort((a, b) => off(b) - off(a)).slice(0, mostSiblings));
+  return siblings.filter((s) => kept.has(s));
+}
+
+function Siblings({ siblings, id }) {
+  const [whole, setWhole] = useState(false);
+  const here = siblings.some((s) => s.robot_id === id);
+  if (siblings.length <= (here ? 1 : 0))
+    return <Empty title="No other robot of this kind has missions yet" />;
+  const off = Math.max(
+    0.02,
+    ...siblings
+      .flatMap((s) => [Math.abs(s.ci[0] - 1), Math.abs(s.ci[1] - 1)])
+      .filter((v) => Number.isFinite(v)),
+  );
+  const at = (v) => `${50 + 50 * Math.max(-1, Math.min(1, (v - 1) / off))}%`;
+  const some = whole || siblings.length <= mostSiblings ? siblings : chosenOf(siblings, id);
+  return (
+    <>
+      <Bars
+        class="siblings"
+        head={['Robot', 'Interval', 'Ratio']}
+        rows={some.map((s) => ({
+          key: s.robot_id,
+          class: s.robot_id === id ? 'this' : '',
+          name: [
+            s.robot_id === id ? <b>{id}</b> : <a href={robotLink(s.robot_id)}>{s.robot_id}</a>,
+            s.stands_out && [' ', <span class="flag">stands out</span>],
+          ],
+          bar: (
+            <svg width="100%" height="16" aria-hidden="true">
+              <line x1="50%" x2="50%" y1="0" y2="16" class="one" />
+              <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" class="whisker" />
+              <circle cx={at(s.ratio)} cy="8" r="4" class={s.stands_out ? 'out' : ''} />
+            </svg>
+          ),
+          of: format.fixed(s.ratio, 3),
+        }))}
+      />
+      <p class="note foot">
+        Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the
+        line is 1.{!here && ` ${id} has too few missions with its model in force.`}
+      </p>
+      {siblings.length > mostSiblings && (
+        <Button aria-expanded={String(whole)} onClick={() => setWhole(!whole)}>
+          {whole ? 'Show fewer' : `Show all ${siblings.length}`}
+        </Button>
+      )}
     </>
   );
 }

@@ -1,13 +1,12 @@
 // A mission over time and on the floor: power, speed, path, and every sample of the motors when zoomed.
 import { useMemo, useRef, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { Chart, axis, clockSteps, lastAt, line, withAlpha, withGaps } from '../chart.jsx';
+import { Chart, axis, lastAt, line, runAxis, withAlpha, withGaps } from '../chart.jsx';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
 import { palette } from '../theme.js';
 import { Button, Choice, Empty, Key, Panel, Readouts } from '../widgets.jsx';
-import { runClock } from './clock.js';
 import { Motors } from './motors.jsx';
 
 const tracePoints = 700;
@@ -64,7 +63,7 @@ function Charts({ trace, mission, setZoom, setCursor }) {
     return {
       cursor,
       hooks,
-      axes: [axis(time, { size: 28, incrs: clockSteps, values: runClock }), axis(value)],
+      axes: [runAxis(time), axis(value)],
       bands: shown.map(([colour, , share], k) => ({
         series: [3 * k + 1, 3 * k + 2],
         fill: withAlpha(colour, share),

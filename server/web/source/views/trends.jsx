@@ -4,13 +4,10 @@ import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
 import { Strips } from '../bars.jsx';
 import { Chart, axis, bars, dateAxis, line, timesWith, withGaps } from '../chart.jsx';
-import { useCharged } from '../charged.js';
-import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
-import { Export } from '../export_buttons.jsx';
-import { saveText } from '../export.js';
 import * as format from '../format.js';
-import { missionLink, robotLink } from '../route.js';
+import { newest } from '../logs.js';
+import { missionLink, robotLink, useChoices } from '../route.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import { palette } from '../theme.js';
@@ -27,10 +24,12 @@ import {
   robotsOf,
   timesOf,
 } from './choosing.jsx';
+import { Export, saveText } from './export.jsx';
 
 const defaultDays = { day: 30, week: 182 };
 const lasts = { 1: '24 h', 7: '7 d', 30: '30 d', 182: '26 weeks' };
 const dayMs = 86_400_000;
+const mostStays = 20_000; // at chargers
 const fewest = 8; // periods that the time axis spans, so that the bar of a single one stays narrow
 const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
 
@@ -251,6 +250,22 @@ function Charts({ series, kind }) {
       <Periods series={series} kind={kind} />
     </>
   );
+}
+
+// Energy charged in a period, summed over the stays at chargers in the log: {stays, joule, whole}; not whole:
+// there are more stays, which were not read.
+async function readCharged([from, to], robots, signal) {
+  const filter = { kind: 'charged', robot_id: robots.join(','), from_utime_us: from, to_utime_us: to };
+  const { entries, next } = await newest('/v1/event-log', filter, mostStays, signal);
+  const joule = entries.reduce((sum, { detail }) => sum + (detail.charged_j ?? 0), 0);
+  return { stays: entries.length, joule, whole: !next };
+}
+
+// Null until it is read. `period`: [from, to] in microseconds.
+function useCharged(period, robots) {
+  const key = JSON.stringify([period, robots]);
+  const { value, path } = useRead((signal) => readCharged(period, robots, signal), key);
+  return path === key ? value : null;
 }
 
 // The sums of the period with their changes, the energy charged, and its excess over that used by missions.

@@ -7,9 +7,8 @@ import { missionLink, robotLink } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Button, Choice, Failure, Panel } from '../widgets.jsx';
-import { SelectField, fieldsOf } from '../views/choosing.jsx';
-import { drawLine, drawNamed } from './drawing.js';
-import { MapCanvas } from './canvas.jsx';
+import { SelectField, fieldsOf } from './choosing.jsx';
+import { MapCanvas, drawLine, drawNamed } from './map_canvas.jsx';
 
 const tracePoints = 5000;
 const listed = 50;

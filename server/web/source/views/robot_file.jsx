@@ -2,15 +2,15 @@
 // from the service's schema of robot files, and reviewed by the service as it changes.
 import { useMemo, useState } from 'preact/hooks';
 import { del, delayed, get, idPath, post, put, query, useGet, useRead } from '../api.js';
-import { ConfirmButton } from '../confirm.jsx';
+import { ConfirmButton } from '../dialog.jsx';
 import * as format from '../format.js';
 import { reloadFleet, useLive, useModelled } from '../live.js';
 import { forgetModel } from '../models.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
 import { Answer, Button, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
-import { Changes, changesOf, unitOf } from '../views/changes.jsx';
-import { Field, NumberInput, SelectField, fieldsOf } from '../views/choosing.jsx';
+import { Changes, changesOf, unitOf } from './changes.jsx';
+import { Field, NumberInput, SelectField, fieldsOf } from './choosing.jsx';
 
 const reviewMs = 300;
 

@@ -1,6 +1,9 @@
 // Downloads of lists, read page by page; energies are always in joules.
-import { getText, query } from './api.js';
-import { newest } from './logs.js';
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { getText, query } from '../api.js';
+import * as format from '../format.js';
+import { newest } from '../logs.js';
+import { Button } from '../widgets.jsx';
 
 const pageRows = 1000;
 
@@ -39,3 +42,44 @@ export const exportMissions = (kind, filter, progress, signal) =>
   kind === 'csv'
     ? saveText(`/v1/missions${query({ ...filter, limit: pageRows })}`, 'missions', progress, signal)
     : saveJson(filter, progress, signal);
+
+// Buttons that save data as files, of rows [name, save(progress, signal)]. `total`: lines, if stated.
+export function Export({ of, total, disabled }) {
+  const [count, setCount] = useState(null);
+  const [error, setError] = useState(null);
+  const abort = useRef(null);
+  useEffect(() => () => abort.current?.abort(), []);
+  const run = async (save) => {
+    abort.current = new AbortController();
+    setError(null);
+    setCount(0);
+    try {
+      await save(setCount, abort.current.signal);
+    } catch (fault) {
+      if (fault.name !== 'AbortError') setError(fault);
+    }
+    setCount(null);
+  };
+  if (count !== null)
+    return (
+      <div class="export" role="status">
+        <progress max={total || undefined} value={total ? count : undefined} /> {format.fixed(count)}
+        {total && ` of ${format.fixed(total)}`}
+        <Button onClick={() => abort.current.abort()}>Stop</Button>
+      </div>
+    );
+  return (
+    <div class="export">
+      {error && (
+        <span class="fault" role="alert">
+          {error.message}
+        </span>
+      )}
+      {of.map(([name, save]) => (
+        <button key={name} type="button" disabled={disabled} onClick={() => run(save)}>
+          Export {name}
+        </button>
+      ))}
+    </div>
+  );
+}

@@ -1,10 +1,10 @@
 // Upload and removal of a level's plan.
 import { useState } from 'preact/hooks';
 import { del, putFile, query } from '../api.js';
-import { ConfirmButton } from '../confirm.jsx';
+import { ConfirmButton } from '../dialog.jsx';
 import { Button, Failure, Panel } from '../widgets.jsx';
-import { Field, fieldsOf } from '../views/choosing.jsx';
-import { fromMapYaml, planPath } from './plan.js';
+import { Field, fieldsOf } from './choosing.jsx';
+import { planPath } from './map_canvas.jsx';
 
 const numbers = [
   ['resolution_m', 'Side of a pixel', 'm'],
@@ -13,7 +13,26 @@ const numbers = [
   ['origin_yaw_rad', 'Rotation', 'rad'],
 ];
 
-export function PlanForm({ place, level, onChange }) {
+// The fields of a map.yaml of ROS.
+function fromMapYaml(text) {
+  const resolution = /^resolution:\s*([-+.\deE]+)/m.exec(text)?.[1];
+  const origin =
+    /^origin:\s*\[([^\]]+)\]/m
+      .exec(text)?.[1]
+      .split(',')
+      .map((part) => part.trim()) ?? [];
+  const found = {
+    resolution_m: resolution,
+    origin_x_m: origin[0],
+    origin_y_m: origin[1],
+    origin_yaw_rad: origin[2],
+  };
+  return Object.fromEntries(
+    Object.entries(found).filter(([, value]) => Number.isFinite(Number(value ?? NaN))),
+  );
+}
+
+export function FloorPlanForm({ place, level, onChange }) {
   const [given, setGiven] = useState({
     ...place,
     ...level,

@@ -1,21 +1,17 @@
 // Robots on the floor, live, with the plan of their map and level; and missions replayed there.
 import { useEffect } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { needsSomeone, useAttention } from '../attention.js';
-import { useChoices } from '../choices.js';
 import * as format from '../format.js';
 import { drawZones } from '../floor.jsx';
-import { now } from '../health.jsx';
+import { needsSomeone, now, useAttention } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
-import { robotLink } from '../route.js';
+import { robotLink, useChoices } from '../route.js';
 import { TablePanel, column, figure, names } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Answer, Choice, Empty, Panel, useTitleOf } from '../widgets.jsx';
-import { SelectField } from '../views/choosing.jsx';
-import { MapCanvas } from './canvas.jsx';
-import { drawLine, drawNamed } from './drawing.js';
-import { useImage } from './plan.js';
-import { PlanForm } from './plan_form.jsx';
+import { SelectField } from './choosing.jsx';
+import { MapCanvas, drawLine, drawNamed, useImage } from './map_canvas.jsx';
+import { FloorPlanForm } from './floor_plan_form.jsx';
 import { Playback } from './playback.jsx';
 
 const renewMs = 30_000;
@@ -159,7 +155,7 @@ function Shown({ maps, given, change, reload }) {
           />
         </>
       )}
-      <PlanForm key={place} place={{ map, level: floor }} level={level} onChange={stored} />
+      <FloorPlanForm key={place} place={{ map, level: floor }} level={level} onChange={stored} />
     </>
   );
 }

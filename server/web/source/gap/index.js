@@ -1,2 +1,0 @@
-import '../shared.js';
-export { Gap } from '../views/gap.jsx';

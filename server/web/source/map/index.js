@@ -1,2 +1,0 @@
-import '../shared.js';
-export { FloorLive } from './map.jsx';
