@@ -39,7 +39,7 @@ function TestTable({ missions }) {
     error('after', 'Error after'),
     bar('after', 'modelled'),
   ];
-  return <Table class="test" columns={columns} rows={missions} keyOf={(m) => m.id} />;
+  return <Table class="test" columns={columns} rows={missions} />;
 }
 
 const reasons = {

@@ -128,13 +128,7 @@ function Shown({ of, live }) {
         />
       )}
       <Summary nodes={of.nodes} leases={leases} />
-      <TablePanel
-        title="Daemons"
-        class="cluster"
-        columns={nodeColumns(of.node)}
-        rows={of.nodes}
-        keyOf={(n) => n.node}
-      />
+      <TablePanel title="Daemons" class="cluster" columns={nodeColumns(of.node)} rows={of.nodes} />
       <div class="columns">
         <Panel title="Robots">
           <Leases leases={leases} />

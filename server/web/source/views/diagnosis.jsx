@@ -79,6 +79,9 @@ function WhereBar({ of: w, most }) {
   );
 }
 
+// A line below the name of an effect or a term.
+const Check = ({ children }) => <span class="note check">{children}</span>;
+
 function Where({ regions }) {
   if (regions.length === 0) return <Empty title="No region with a significant gap" />;
   const shown = regions.slice(0, 12);
@@ -106,21 +109,15 @@ function Where({ regions }) {
   );
 }
 
+const Effect = ({ id, workshop, power_w: power, calibrates, varies }) => [
+  effectName(id),
+  workshop && <Check>check: {workshop}</Check>,
+  power > 0 && <Check>{format.text(format.power(power))} on average</Check>,
+  calibrates && <Check>corrects {calibrates} of the robot file</Check>,
+  varies >= 0.01 && <Check>varies by {share(varies, 0)} between missions</Check>,
+];
 const effectColumns = [
-  column(
-    'effect',
-    'Effect',
-    (e) => (
-      <>
-        {effectName(e.id)}
-        {e.workshop && <span class="note check">check: {e.workshop}</span>}
-        {e.power_w > 0 && <span class="note check">{format.text(format.power(e.power_w))} on average</span>}
-        {e.calibrates && <span class="note check">corrects {e.calibrates} of the robot file</span>}
-        {e.varies >= 0.01 && <span class="note check">varies by {share(e.varies, 0)} between missions</span>}
-      </>
-    ),
-    { head: true },
-  ),
+  column('effect', 'Effect', Effect, { head: true }),
   figure('probability', 'Probability', (e) => chance(e.probability)),
   column('strength', 'Strength', strengths),
   figure('share', 'Returns without it', (e) => share(e.share, 0), {
@@ -152,16 +149,9 @@ const barOf = (name, value, note) => ({ name, value, of: format.percent(value, 1
 // "v^2" as "v²".
 const powers = (text) => text.replaceAll('^2', '²').replaceAll('^3', '³');
 const termColumns = [
-  column(
-    'term',
-    'Term',
-    ([name, t]) => (
-      <>
-        {powers(name)} <span class="note check">{powers(t.unit)}</span>
-      </>
-    ),
-    { head: true },
-  ),
+  column('term', 'Term', ([name, { unit }]) => [powers(name), <Check> {powers(unit)}</Check>], {
+    head: true,
+  }),
   figure('data', 'In the data', ([, t]) => format.withDeviation(t.value, t.sd)),
   figure('model', 'Robot file', ([, t]) => format.likeDeviation(t.model, t.sd)),
   figure('explained', 'This diagnosis', ([, t]) => format.likeDeviation(t.explained, t.sd)),
@@ -178,9 +168,7 @@ function Regression({ of }) {
   return (
     <Panel title="Compared with a linear regression" aside={of.wins && <b>The regression predicts better</b>}>
       <Bars class="referee" rows={rows.map(([name, value]) => barOf(name, value))} />
-      {terms.length > 0 && (
-        <Table class="effects" columns={termColumns} rows={terms} keyOf={([name]) => name} />
-      )}
+      {terms.length > 0 && <Table class="effects" columns={termColumns} rows={terms} />}
       <Texts of={of.says} />
       <p class="note foot">
         Power error on held-out data: parts of the missions that were not used for the fit.
@@ -301,13 +289,7 @@ export function Result({ result: r, children }) {
       <Verdict result={r} />
       <Figures result={r} />
       {r.effects.length > 0 && (
-        <TablePanel
-          title="Effects"
-          class="effects"
-          columns={effectColumns}
-          rows={r.effects}
-          keyOf={(e) => e.id}
-        />
+        <TablePanel title="Effects" class="effects" columns={effectColumns} rows={r.effects} />
       )}
       {placed && floorOf(r)}
       {children && <Panel title="Adopt">{children}</Panel>}
@@ -317,7 +299,6 @@ export function Result({ result: r, children }) {
           class="effects"
           columns={correctionColumns}
           rows={r.corrections}
-          keyOf={(c) => c.parameter}
         />
       )}
       {r.verdict !== 'none' && (

@@ -193,7 +193,6 @@ export function MissionFigures({ missions: all, total, after }) {
       title="Missions"
       columns={columns}
       rows={missions}
-      keyOf={(m) => m.mission_id}
       note={total > missions.length && `The first ${missions.length} of ${total} missions.`}
     />
   );
@@ -232,13 +231,12 @@ export function Comparison({ of: c }) {
   ];
   return (
     <>
-      <TablePanel title="Groups" columns={groupColumns} rows={c.groups} keyOf={(g) => g.name} />
+      <TablePanel title="Groups" columns={groupColumns} rows={c.groups} />
       {d && (
         <TablePanel
           title={`Energy per metre of ${d.to} above ${d.from}`}
           columns={partColumns}
           rows={parts}
-          keyOf={([name]) => name}
         />
       )}
       {c.strengths.map((s) => (
@@ -247,7 +245,6 @@ export function Comparison({ of: c }) {
           title={`${effectName(s.id)} by group`}
           columns={strengthColumns}
           rows={Object.entries(s.groups).map(([name, g]) => [name, g, s.unit])}
-          keyOf={([name]) => name}
         />
       ))}
     </>

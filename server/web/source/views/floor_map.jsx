@@ -127,7 +127,7 @@ function Zones({ map, onMark }) {
   const rows = map.zones.map((z, k) => ({ ...z, number: k + 1 }));
   return (
     <>
-      <Table class="zones" columns={columns} rows={rows} keyOf={(z) => z.number} />
+      <Table class="zones" columns={columns} rows={rows} />
       <p class="note foot">
         A zone may be the floor (a carpet, a slope, a joint), or what robots do there: turn, brake, wait. A{' '}
         <a href="#/gap">diagnosis</a> distinguishes effects.
@@ -156,7 +156,7 @@ function Squares({ map }) {
   return (
     <details class="model" open={!narrow}>
       <summary>The {shown.length} squares with the greatest excess energy</summary>
-      <Table class="squares" columns={columns} rows={shown} keyOf={(c) => `${c.x_m} ${c.y_m}`} />
+      <Table class="squares" columns={columns} rows={shown} />
     </details>
   );
 }

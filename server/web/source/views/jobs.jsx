@@ -42,18 +42,12 @@ function foundWords(summary) {
   return summary.verdict === 'effects' ? effects : `${verdict}; most likely ${effects}`;
 }
 
+const Name = ({ id, cause }) => [
+  <a href={`#/gap/${id}`}>{id}</a>,
+  cause === 'watch' && <span class="note"> after a drift</span>,
+];
 const columns = [
-  column(
-    'id',
-    'Diagnosis',
-    (d) => (
-      <>
-        <a href={`#/gap/${d.id}`}>{d.id}</a>
-        {d.cause === 'watch' && <span class="note"> after a drift</span>}
-      </>
-    ),
-    { head: true },
-  ),
+  column('id', 'Diagnosis', Name, { head: true }),
   column('robot', 'Robot', (d) => <a href={robotLink(d.robot_id)}>{d.robot_id}</a>),
   column('started', 'Started', (d) => format.time(d.created_utime_us), { class: 'when' }),
   column('state', 'State', (d) => <State of={d} />),

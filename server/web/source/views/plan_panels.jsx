@@ -45,7 +45,7 @@ function Drives({ drives }) {
     figure('time', 'Time', (d) => format.about(d.duration_s), long),
     figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), long),
   ];
-  return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;
+  return <Table class="chances" columns={columns} rows={drives} />;
 }
 
 function Explanation({ answer, autonomy: a, planned }) {

@@ -161,7 +161,6 @@ export function Playback({ given, change, level, image, children }) {
           class="played"
           columns={columns}
           rows={played.map((of, k) => ({ of, colour: colours[k], k: lastAt(of.t, second) }))}
-          keyOf={({ of }) => of.mission.id}
         />
       </Panel>
     </>

@@ -207,7 +207,7 @@ function Periods({ series, kind }) {
         figure(key, name, (g) => cell(of(g)), more && { class: more }),
       ),
   ].filter(Boolean);
-  return <Table class="trends" columns={columns} rows={rows} keyOf={(g) => `${g.from_utime_us} ${g.name}`} />;
+  return <Table class="trends" columns={columns} rows={rows} />;
 }
 
 function Charts({ series, kind }) {
@@ -349,7 +349,6 @@ function Sides({ sides }) {
       class="compare"
       columns={columns}
       rows={[...figures.slice(0, consumed), ...terms, ...figures.slice(consumed)]}
-      keyOf={(r) => r.name}
     />
   );
 }
