@@ -664,7 +664,7 @@ await check('trends sum missions by day and week', async () => {
     const energies = (await page.locator('.trends tbody td:nth-child(3)').allTextContents()).map(joulesOf);
     const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
     expect(Math.abs(energies.reduce((a, b) => a + b) / sum - 1) < 0.01, `${energies} against ${sum} J`);
-    equal(await page.locator('.trend-charts .uplot').count(), 3, 'charts');
+    equal(await page.locator('.charts .uplot').count(), 3, 'charts');
   }
   await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption('oval-01');
   await page.locator('.trend-key', { hasText: 'oval-01' }).waitFor();
@@ -1276,12 +1276,12 @@ await check('other views are loaded on demand and report failures', async () => 
   await fresh.locator('.fleet tbody th a').first().waitFor();
   expect(
     !(await fresh.evaluate(() =>
-      performance.getEntriesByType('resource').some((r) => /(views|gap|uplot)\.js$/.test(r.name)),
+      performance.getEntriesByType('resource').some((r) => /(views|uplot)\.js$/.test(r.name)),
     )),
     'other views are part of the first load',
   );
   faultsWanted = true;
-  await fresh.route('**/gap.js', (route) => route.abort());
+  await fresh.route('**/views.js', (route) => route.abort());
   await fresh.getByRole('link', { name: 'Gap', exact: true }).click();
   await fresh.getByText('This part of the page could not be loaded').waitFor();
   await fresh.screenshot({ path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png') });
@@ -2229,7 +2229,7 @@ await check('the first load is small; other views follow', async () => {
   };
   const first = await packed(['index.html', 'app.js', 'base.js', 'app.css', 'favicon.svg']);
   figures.first_load_gzipped_bytes = first;
-  figures.other_views_gzipped_bytes = await packed(['views.js', 'shared.js', 'views.css']);
+  figures.other_views_gzipped_bytes = await packed(['views.js', 'views.css']);
   figures.charts_gzipped_bytes = await packed(['uplot.js']);
   expect(first < firstLoadLimitBytes, `${first} bytes`);
 });

@@ -60,8 +60,8 @@ export function SortChoice({ columns, sort, onSort }) {
   const sortable = columns.filter((c) => c.sort);
   return (
     <span class="sort-choice">
-      <label>
-        <span>Sort by</span>
+      <label class="with-unit">
+        <span class="note">Sort by</span>
         <select value={sort.key} onChange={(event) => onSort(event.currentTarget.value)}>
           {sortable.map((c) => (
             <option key={c.key} value={c.key}>

@@ -142,7 +142,7 @@ export function Panel({ title, aside, children, class: name }) {
 // The head of a view: its title, with links above it and a note and other content next to it.
 export const Heading = ({ title, crumbs, note, children }) => (
   <div class="heading">
-    {crumbs && <p class="crumbs">{crumbs}</p>}
+    {crumbs && <p class="note crumbs">{crumbs}</p>}
     <h1>{title}</h1>
     {note && <span class="note">{note}</span>}
     {children}
@@ -186,7 +186,7 @@ export const missionStates = {
 };
 
 export const MissionState = ({ mission: { state } }) => (
-  <span class={`state state-${state}`} title={missionStates[state]}>
+  <span class={`state ${state}`} title={missionStates[state]}>
     {state}
   </span>
 );

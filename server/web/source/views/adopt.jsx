@@ -35,7 +35,7 @@ function Messages({ job, state, refusal, refused }) {
   return (
     <>
       {adopted !== null && (
-        <p class="adopted" role="status">
+        <p class="verdict-box" role="status">
           Version {adopted} is in force for <a href={robotLink(job.robot_id)}>{job.robot_id}</a>: planning and
           autonomy use it now, the meter from the next mission on.
         </p>

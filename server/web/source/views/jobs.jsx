@@ -23,7 +23,7 @@ export const effectName = (id) =>
 export const verdictTitle = (of) => of.verdict_title ?? format.words(of.verdict);
 
 export function State({ of }) {
-  return <span class={`job job-${of.state}`}>{stateNotes[of.state]}</span>;
+  return <span class={`state ${of.state}`}>{stateNotes[of.state]}</span>;
 }
 
 // The names of the effects of a verdict, each with those that it is not distinguished from; of another

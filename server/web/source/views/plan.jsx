@@ -174,7 +174,7 @@ function Result({ plan, path, take }) {
 
 function Outdated({ onCompute }) {
   return (
-    <div class="outdated" role="status">
+    <div class="verdict-box outdated" role="status">
       <b>Out of date.</b> The path or the terms have changed since this was computed.{' '}
       <Button onClick={onCompute}>Compute again</Button>
     </div>

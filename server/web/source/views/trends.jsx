@@ -240,7 +240,7 @@ function Charts({ series, kind }) {
   return (
     <>
       <Names series={series} />
-      <div class="trend-charts">
+      <div class="charts">
         {shown.map(({ title, aside, label, ...chart }) => (
           <Panel key={title} title={title} aside={aside}>
             <TrendChart series={series} kind={kind} label={label ?? title} {...chart} />
