@@ -114,15 +114,16 @@ export const useGet = (path, ...more) => useRead((signal) => get(path, signal), 
 
 const kept = new Map();
 
-// The response at `path`, requested once; again after forget(path) or a failure.
-export function getOnce(path) {
-  if (!kept.has(path)) {
-    kept.set(path, get(path));
-    kept.get(path).catch(() => forget(path));
+// What `read()` resolves to, read once; again after forget(key) or a failure.
+export function once(key, read) {
+  if (!kept.has(key)) {
+    kept.set(key, read());
+    kept.get(key).catch(() => forget(key));
   }
-  return kept.get(path);
+  return kept.get(key);
 }
-export const forget = (path) => kept.delete(path);
+export const forget = (key) => kept.delete(key);
+export const getOnce = (path) => once(path, () => get(path));
 
 // `read` after a pause, unless its request is not needed any more.
 export const delayed = (read, ms) => async (signal) => {

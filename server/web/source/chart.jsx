@@ -1,5 +1,6 @@
 // uPlot in a component: loaded when first drawn, follows its container's width and the theme.
-import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
+import { once, useRead } from './api.js';
 import { energyUnit } from './energy.js';
 import { palette, useTheme } from './theme.js';
 import { fixed, time } from './format.js';
@@ -120,36 +121,14 @@ export function lastAt(times, at) {
 }
 
 let uPlot = null;
-let loading = null;
 
-export function loadCharts() {
-  loading ??= import('./uplot.js').then(
-    (module) => (uPlot = module.default),
-    (error) => {
-      loading = null;
-      throw error;
-    },
-  );
-  return loading;
-}
+export const loadCharts = () => once('charts', async () => (uPlot = (await import('./uplot.js')).default));
 
 // Paths of a series drawn as bars of a width along x, each from `start` beside its x; for use in `make`.
 export const bars = (width, start) => {
   const x0 = { unit: 1, values: ({ data: [x] }) => x.map((at) => at + start) };
   return uPlot.paths.bars({ disp: { x0, size: { unit: 1, values: () => [width] } } });
 };
-
-function useCharts() {
-  const [state, setState] = useState(uPlot === null ? 'loading' : 'ready');
-  useEffect(() => {
-    if (uPlot === null)
-      loadCharts().then(
-        () => setState('ready'),
-        () => setState('failed'),
-      );
-  }, []);
-  return state;
-}
 
 // A series without marks of its points.
 export const line = (stroke, width = 1.5, more) => ({ stroke, width, points: { show: false }, ...more });
@@ -168,10 +147,11 @@ export function Chart({ make, data, height = 220, label, changes = [], onReady }
   const plot = useRef(null);
   const latest = useRef(data);
   const dark = useTheme();
-  const state = useCharts();
+  const loading = useRead(loadCharts, uPlot ? null : 'charts');
+  const ready = uPlot !== null;
   latest.current = data;
   useLayoutEffect(() => {
-    if (state !== 'ready') return undefined;
+    if (!ready) return undefined;
     const width = () => Math.max(200, Math.floor(place.current.clientWidth));
     const options = { ...usual, ...make(), width: width(), height };
     const u = new uPlot(options, latest.current, place.current);
@@ -186,14 +166,13 @@ export function Chart({ make, data, height = 220, label, changes = [], onReady }
       plot.current = null;
       u.destroy();
     };
-  }, [state, dark, height, energyUnit(), ...changes]);
+  }, [ready, dark, height, energyUnit(), ...changes]);
   useEffect(() => {
     if (plot.current !== null && plot.current.data !== data) plot.current.setData(data);
   }, [data]);
-  const text = state === 'failed' ? 'The chart could not be loaded.' : '';
   return (
     <div class="chart" role="img" aria-label={label} ref={place} style={{ minHeight: `${height}px` }}>
-      {text}
+      {loading.error && 'The chart could not be loaded.'}
     </div>
   );
 }

@@ -12,34 +12,24 @@ import { Button, Empty, Guard } from './widgets.jsx';
 import { Fleet } from './views/fleet.jsx';
 import { later } from './views/later.jsx';
 
-const views = {
-  fleet: Fleet,
-  robots: later('Robot'),
-  'robot-file': later('RobotFile'),
-  missions: later('Missions'),
-  mission: later('Mission'),
-  trends: later('Trends'),
-  map: later('FloorLive'),
-  floor: later('Floor'),
-  plan: later('Plan'),
-  gap: later('Gap'),
-  audit: later('Audit'),
-  cluster: later('Cluster'),
-  help: later('Help'),
-};
-
-const tabs = Object.entries({
-  fleet: 'Fleet',
-  missions: 'Missions',
-  trends: 'Trends',
-  map: 'Map',
-  floor: 'Floor',
-  plan: 'Plan',
-  gap: 'Gap',
-  audit: 'Log',
-  cluster: 'Cluster',
-  help: 'Help',
-});
+// The views with the names of their tabs, or the tab that they belong to.
+const views = new Map(
+  Object.entries({
+    fleet: [Fleet, 'Fleet'],
+    robots: [later('Robot'), '', 'fleet'],
+    'robot-file': [later('RobotFile'), '', 'fleet'],
+    missions: [later('Missions'), 'Missions'],
+    mission: [later('Mission'), '', 'missions'],
+    trends: [later('Trends'), 'Trends'],
+    map: [later('FloorLive'), 'Map'],
+    floor: [later('Floor'), 'Floor'],
+    plan: [later('Plan'), 'Plan'],
+    gap: [later('Gap'), 'Gap'],
+    audit: [later('Audit'), 'Log'],
+    cluster: [later('Cluster'), 'Cluster'],
+    help: [later('Help'), 'Help'],
+  }),
+);
 
 function Link() {
   const live = useLive();
@@ -99,15 +89,16 @@ function App() {
       main.current.focus({ preventScroll: true });
     }
   }, [route.view, route.id]);
-  const View = views[route.view];
+  const [View, , here = route.view] = views.get(route.view) ?? [];
   const change = unit === 'Wh' ? 'show energy in joules' : 'show energy in watt hours';
   const theme = dark ? 'Light theme' : 'Dark theme';
-  const here = { robots: 'fleet', 'robot-file': 'fleet', mission: 'missions' }[route.view] ?? route.view;
-  const tab = ([view, name]) => (
-    <a key={view} href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
-      {name}
-    </a>
-  );
+  const tab = ([view, [, name]]) =>
+    name &&
+    (clustered || view !== 'cluster') && (
+      <a key={view} href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
+        {name}
+      </a>
+    );
   const skip = (event) => {
     event.preventDefault();
     main.current.focus();
@@ -124,7 +115,7 @@ function App() {
           </svg>
           joulecast
         </a>
-        <nav aria-label="Views">{tabs.filter(([view]) => clustered || view !== 'cluster').map(tab)}</nav>
+        <nav aria-label="Views">{[...views].map(tab)}</nav>
         <Link />
         <Button
           class="unit-choice"

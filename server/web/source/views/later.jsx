@@ -15,9 +15,8 @@ async function load() {
   try {
     [views] = await Promise.all([import('./index.js'), loadStyle()]);
   } catch {
-    throw Object.assign(new Error('The service may be restarting, or the network is down.'), {
-      title: 'This part of the page could not be loaded',
-    });
+    const message = 'The service may be restarting, or the network is down.';
+    throw { title: 'This part of the page could not be loaded', message };
   }
 }
 

@@ -119,18 +119,6 @@ function Figures({ answer }) {
   return <Readouts large rows={rows} />;
 }
 
-function FrontPanel({ answer, take }) {
-  return (
-    <Panel class="screen" title="Energy against time">
-      {answer.pareto.length < 2 ? (
-        <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>
-      ) : (
-        <Front answer={answer} take={take} />
-      )}
-    </Panel>
-  );
-}
-
 function Result({ plan, path, take }) {
   const { answer, request } = plan;
   const driven = useMemo(
@@ -162,7 +150,9 @@ function Result({ plan, path, take }) {
               label="The planned path, coloured by power; circle: start, square: end"
             />
           </Panel>
-          <FrontPanel answer={answer} take={take} />
+          <Panel class="screen" title="Energy against time">
+            <Front answer={answer} take={take} />
+          </Panel>
           <Panel title="Accuracy of the plan">
             <Certificate answer={answer} />
           </Panel>

@@ -4,7 +4,7 @@ import { Chart, axis, line, withAlpha } from '../chart.jsx';
 import { energy, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
-import { Button, Key } from '../widgets.jsx';
+import { Button, Empty, Key } from '../widgets.jsx';
 
 // `column` of a profile at other times, by linear interpolation; nulls without such a profile.
 function atTimes(times, profile, column) {
@@ -136,6 +136,8 @@ export function Front({ answer, take }) {
   const data = useMemo(() => frontData(answer, scale.joule), [answer, scale.joule]);
   const [at, setAt] = useState(0);
   const point = front[Math.min(at, front.length - 1)];
+  if (front.length < 2)
+    return <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>;
   const [first, last] = [front[0], front[front.length - 1]];
   return (
     <>
