@@ -43,7 +43,8 @@ export function Record({ mission: m, model }) {
 const payloadVerdicts = {
   as_declared: () => 'as declared',
   undeclared: (p) => `${p.undeclared_kg < 0 ? 'less' : 'more'} than declared`,
-  inseparable: () => 'not distinguishable from friction and slope with this motion',
+  inseparable: () =>
+    'not distinguishable from friction and slope with this motion, or the robot is lighter than in its file',
 };
 
 // Payload and friction estimated from the motion of this mission.
