@@ -140,8 +140,8 @@ const usual = {
   cursor: { drag: { x: false, y: false } },
 };
 
-// `make()` gives uPlot's options without width and height; called again when `changes`, the theme or the unit
-// of energy do.
+// `make(palette)` gives uPlot's options without width and height; called again when `changes`, the theme or
+// the unit of energy do.
 export function Chart({ make, data, height = 220, label, changes = [], onReady }) {
   const place = useRef(null);
   const plot = useRef(null);
@@ -153,7 +153,7 @@ export function Chart({ make, data, height = 220, label, changes = [], onReady }
   useLayoutEffect(() => {
     if (!ready) return undefined;
     const width = () => Math.max(200, Math.floor(place.current.clientWidth));
-    const options = { ...usual, ...make(), width: width(), height };
+    const options = { ...usual, ...make(palette()), width: width(), height };
     const u = new uPlot(options, latest.current, place.current);
     plot.current = u;
     onReady?.(u);

@@ -117,7 +117,7 @@ export function Charge({ state }) {
   return (
     <>
       <span
-        class={`charge-bar ${state.charging ? 'charging' : share < lowCharge ? 'low' : ''}`}
+        class={`charge-bar ${state.charging ? 'modelled' : share < lowCharge ? 'bad' : 'good'}`}
         aria-hidden="true"
       >
         <span style={{ width: `${Math.max(2, share * 100)}%` }} />

@@ -31,14 +31,19 @@ const views = new Map(
   }),
 );
 
+const links = {
+  live: ['Live', 'good'],
+  connecting: ['Connecting', 'measured'],
+  offline: ['Offline', 'bad'],
+  refused: ['Signed out', 'measured'],
+};
+
 function Link() {
   const live = useLive();
-  const name = { live: 'Live', connecting: 'Connecting', offline: 'Offline', refused: 'Signed out' }[
-    live.link
-  ];
+  const [name, tone] = links[live.link];
   return (
     <span class={`link ${live.link}`} role="status">
-      <span class="lamp" aria-hidden="true" />
+      <span class={`lamp ${tone}`} aria-hidden="true" />
       {name}
     </span>
   );

@@ -49,7 +49,7 @@ function rowsOf(terms, total) {
 function colourOf(row) {
   if (row.total) return row.key;
   if (row.key === 'unexplained') return 'unexplained';
-  return row.change < 0 ? 'back' : 'out';
+  return row.change < 0 ? 'good' : 'out';
 }
 
 function Bar({ row, x, end }) {
@@ -84,7 +84,7 @@ const hatch = (
 function Closing({ sum, end, scale, closure, absent }) {
   const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
   return (
-    <p class="closing">
+    <p class="closing foot">
       Sum of the terms <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
       {closure !== undefined &&
         (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.share(closure, 3)}.`)}

@@ -65,7 +65,7 @@ export function BackTest({ test }) {
     .join(', ');
   return (
     <>
-      <div class={`verdict-box ${test.improves ? 'makes' : 'fails'}`}>
+      <div class={`verdict-box ${test.improves ? 'good' : 'bad'}`}>
         <p class="verdict">
           On {format.count(test.missions.length, 'mission')} not used for the fit, the energy error changes
           from <b>{share(test.error_before, 2)}</b> to <b>{share(test.error_after, 2)}</b>.

@@ -28,7 +28,7 @@ function NodeName({ node, own }) {
   if (node !== own) return node;
   return (
     <>
-      {node} <span class="flag calm">this daemon</span>
+      {node} <span class="flag good">this daemon</span>
     </>
   );
 }

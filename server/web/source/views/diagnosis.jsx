@@ -69,7 +69,7 @@ function WhereBar({ of: w, most }) {
         y="3"
         height="10"
         width={at(Math.max(Math.abs(w.share), most / 200))}
-        class={`account ${w.share < 0 ? 'back' : 'unexplained-plain'}`}
+        class={`account ${w.share < 0 ? 'good' : 'unexplained-plain'}`}
       />
       <line x1={at(ends[0])} x2={at(ends[1])} y1="8" y2="8" class="whisker" />
       {format.known(w.time_share) && (
@@ -189,7 +189,7 @@ function Verdict({ result: r }) {
   const name = verdictTitle(r);
   const effects = likelyNames(r);
   return (
-    <div class={`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}>
+    <div class={`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'bad'}`}>
       <p class="verdict">
         <b>{name[0].toUpperCase() + name.slice(1)}</b>
         {effects && `${r.verdict === 'effects' ? ':' : '; most likely'} ${effects}`}

@@ -47,8 +47,7 @@ function ConditionChart({ map, after }) {
   }, [map]);
   const data = useMemo(() => [middles, map.before_w, ...(after ? [map.after_w] : [])], [middles, map, after]);
   const step = middles.length > 1 ? middles[1] - middles[0] : 1;
-  const make = () => {
-    const c = palette();
+  const make = (c) => {
     const low = Math.min(0, ...map.before_w.map((v, k) => v - (map.half_width_w[k] ?? 0)));
     const high = Math.max(0, ...map.before_w.map((v, k) => v + (map.half_width_w[k] ?? 0)));
     const of = (colour, width, start) =>
@@ -150,13 +149,10 @@ export function PowerFigure({ power, after }) {
     () => [power.t_s, power.measured_w, power.before_w, ...(after ? [power.after_w] : [])],
     [power, after],
   );
-  const make = () => {
-    const c = palette();
-    return {
-      axes: [axis('time since the start, s', { size: 28 }), axis('power, W')],
-      series: [{}, line(c.measured), line(c.gap), ...(after ? [line(c.modelled)] : [])],
-    };
-  };
+  const make = (c) => ({
+    axes: [axis('time since the start, s', { size: 28 }), axis('power, W')],
+    series: [{}, line(c.measured), line(c.gap), ...(after ? [line(c.modelled)] : [])],
+  });
   return (
     <Panel title="Power over time">
       <Chart

@@ -80,29 +80,23 @@ const Mission = ({ id, state: { mission, live } }) =>
 
 const hint = 'measured energy over modelled energy, median of the newest missions';
 
-const widths = Object.fromEntries(
-  'robot=11% power=96px spark=148px charge=116px range=104px time=96px speed=84px ratio=88px mission=16% spent=88px'
-    .split(' ')
-    .map((pair) => pair.split('=')),
-);
-
 // Of rows {id, state, needs, ratio, entry, scale}.
 const columns = [
-  ['robot', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
-  ['health', 'Attention', '', (r) => <Health state={r.state} reasons={r.needs?.reasons} />, urgency],
-  ['power', 'Power', 'figure', Power, (r) => powerNow(r.state)],
-  ['spark', 'Last 90 s', '', ({ entry }) => <Sparkline track={entry.power} />],
-  ['charge', 'Charge', '', Charge, (r) => r.state.state_of_charge],
-  ['range', 'Range', 'figure', Range, (r) => r.state.range_m],
-  ['time', 'Run time', 'figure wide', (r) => format.about(timeOf(r)), timeOf],
-  ['speed', 'Speed', 'figure wide', (r) => format.unit(speedNow(r), 'm/s', 2), speedNow],
-  ['ratio', 'Ratio', 'figure', (r) => <Ratio value={r.ratio ?? null} />, (r) => r.ratio, { hint }],
-  ['mission', 'Mission', '', Mission, (r) => r.state.mission?.start_utime_us],
-  ['spent', 'Energy', 'figure', (r) => energyIn(r.scale, spentOf(r)), spentOf],
-].map(([key, title, kind, cell, sort, more]) =>
+  ['robot', '11%', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
+  ['health', '', 'Attention', '', (r) => <Health state={r.state} reasons={r.needs?.reasons} />, urgency],
+  ['power', '96px', 'Power', 'figure', Power, (r) => powerNow(r.state)],
+  ['spark', '148px', 'Last 90 s', '', ({ entry }) => <Sparkline track={entry.power} />],
+  ['charge', '116px', 'Charge', '', Charge, (r) => r.state.state_of_charge],
+  ['range', '104px', 'Range', 'figure', Range, (r) => r.state.range_m],
+  ['time', '96px', 'Run time', 'figure wide', (r) => format.about(timeOf(r)), timeOf],
+  ['speed', '84px', 'Speed', 'figure wide', (r) => format.unit(speedNow(r), 'm/s', 2), speedNow],
+  ['ratio', '88px', 'Ratio', 'figure', (r) => <Ratio value={r.ratio ?? null} />, (r) => r.ratio, { hint }],
+  ['mission', '16%', 'Mission', '', Mission, (r) => r.state.mission?.start_utime_us],
+  ['spent', '88px', 'Energy', 'figure', (r) => energyIn(r.scale, spentOf(r)), spentOf],
+].map(([key, width, title, kind, cell, sort, more]) =>
   column(key, title, cell, {
     class: `${kind} ${key === 'ratio' ? 'ratio-cell' : key}`,
-    width: widths[key],
+    width,
     sort,
     ...more,
   }),
@@ -370,7 +364,7 @@ export function Fleet({ given: asked }) {
         />
         <SortChoice columns={columns} sort={sort} onSort={onSort} />
         <Button href="#/robot-file">Add a robot</Button>
-        <span class="key">
+        <span class="note key">
           <Key of={{ measured: 'measured', modelled: 'modelled' }} />
         </span>
       </div>

@@ -2,7 +2,6 @@
 import { useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import { Chart, axis, line, runAxis } from '../chart.jsx';
-import { palette } from '../theme.js';
 import { Answer, Button, Choice, Empty, Key, Panel } from '../widgets.jsx';
 
 const mostSamples = 20_000;
@@ -24,13 +23,10 @@ function Sides({ telemetry, mission, quantity }) {
   );
   if (!right.some((v) => v !== null) && !left.some((v) => v !== null))
     return <Empty title="Not measured">This robot does not report it.</Empty>;
-  const make = () => {
-    const p = palette();
-    return {
-      axes: [runAxis('time since the start'), axis(label, { size: 56 })],
-      series: [{}, line(p.accent, 1.25), line(p.measured, 1.25)],
-    };
-  };
+  const make = (p) => ({
+    axes: [runAxis('time since the start'), axis(label, { size: 56 })],
+    series: [{}, line(p.accent, 1.25), line(p.measured, 1.25)],
+  });
   return (
     <>
       <Chart

@@ -3,7 +3,6 @@ import { useMemo, useState } from 'preact/hooks';
 import { Chart, axis, line, withAlpha } from '../chart.jsx';
 import { energy, energyScale } from '../energy.js';
 import * as format from '../format.js';
-import { palette } from '../theme.js';
 import { Button, Empty, Key } from '../widgets.jsx';
 
 // `column` of a profile at other times, by linear interpolation; nulls without such a profile.
@@ -19,8 +18,7 @@ function atTimes(times, profile, column) {
   });
 }
 
-function speedOptions(turns, cursor) {
-  const c = palette();
+function speedOptions(c, turns, cursor) {
   const yaw = axis('yaw rate, °/s', { scale: 'yaw', side: 1, grid: { show: false } });
   return {
     cursor,
@@ -36,8 +34,7 @@ function speedOptions(turns, cursor) {
   };
 }
 
-function powerOptions(turns, cursor) {
-  const c = palette();
+function powerOptions(c, turns, cursor) {
   const nothing = { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] };
   return {
     cursor,
@@ -68,14 +65,14 @@ export function SpeedChart({ answer }) {
   return (
     <>
       <Chart
-        make={() => speedOptions(turns, cursor)}
+        make={(c) => speedOptions(c, turns, cursor)}
         data={data}
         height={210}
         changes={[turns]}
         label={`Speed over ${format.span(answer.duration_s)}, maximum ${peak} metres per second`}
       />
       <Chart
-        make={() => powerOptions(turns, cursor)}
+        make={(c) => powerOptions(c, turns, cursor)}
         data={power}
         height={150}
         changes={[turns]}
@@ -106,8 +103,7 @@ export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW 
 // From zero, so that a front that barely saves anything is shown flat.
 const energyRange = (_, low, high) => [Math.min(0, low), 1.08 * Math.max(0, high)];
 
-function frontOptions(unit) {
-  const c = palette();
+function frontOptions(c, unit) {
   const points = { show: true, size: 12, width: 2, stroke: c.accent, fill: c.accent };
   return {
     scales: { x: { time: false }, y: { range: energyRange } },
@@ -142,7 +138,7 @@ export function Front({ answer, take }) {
   return (
     <>
       <Chart
-        make={() => frontOptions(scale.u)}
+        make={(c) => frontOptions(c, scale.u)}
         data={data}
         height={230}
         changes={[]}

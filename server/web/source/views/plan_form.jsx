@@ -43,7 +43,7 @@ function Legs({ legs, change, fault }) {
     change(next);
   };
   return (
-    <fieldset class="legs">
+    <fieldset class="field legs">
       <legend>Legs</legend>
       <ol>
         {legs.map((leg, k) => (

@@ -15,10 +15,10 @@ function chance(p) {
 }
 
 const verdicts = [
-  [0.95, 'The charge suffices', 'makes'],
-  [0.5, 'The charge probably suffices', 'maybe'],
-  [0.05, 'The charge probably does not suffice', 'fails'],
-  [-1, 'The charge does not suffice', 'fails'],
+  [0.95, 'The charge suffices', 'good'],
+  [0.5, 'The charge probably suffices', ''],
+  [0.05, 'The charge probably does not suffice', 'bad'],
+  [-1, 'The charge does not suffice', 'bad'],
 ];
 
 const bases = {

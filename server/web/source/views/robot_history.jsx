@@ -68,28 +68,25 @@ function RatioChart({ history }) {
     c.restore();
   };
   const spread = Math.max(0.05, ...data[1].map((v) => Math.min(0.6, Math.abs(v - 1)))) * 1.15;
-  const make = () => {
-    const p = palette();
-    return {
-      scales: {
-        x: { time: true, ...timesWith((spanS) => Math.max(60, 0.02 * spanS)) },
-        y: { range: () => [1 - spread, 1 + spread] },
+  const make = (p) => ({
+    scales: {
+      x: { time: true, ...timesWith((spanS) => Math.max(60, 0.02 * spanS)) },
+      y: { range: () => [1 - spread, 1 + spread] },
+    },
+    axes: [axis('', clockAxis), axis('measured / modelled', { size: 56 })],
+    series: [
+      {},
+      {
+        stroke: 'transparent',
+        width: 0,
+        points: { show: true, size: 7, width: 1.5, stroke: p.measured, fill: p.measured },
+        paths: () => null,
       },
-      axes: [axis('', clockAxis), axis('measured / modelled', { size: 56 })],
-      series: [
-        {},
-        {
-          stroke: 'transparent',
-          width: 0,
-          points: { show: true, size: 7, width: 1.5, stroke: p.measured, fill: p.measured },
-          paths: () => null,
-        },
-        line(p.gap, 2, { spanGaps: true }),
-      ],
-      cursor: { show: false },
-      hooks: { drawAxes: [drawMarks] },
-    };
-  };
+      line(p.gap, 2, { spanGaps: true }),
+    ],
+    cursor: { show: false },
+    hooks: { drawAxes: [drawMarks] },
+  });
   const last = data[2][data[2].length - 1] ?? median(data[1]);
   const drifts = drift
     .map((d) => `${format.time(d.start_utime_us)}: ${format.signed(share(d.ratio_after - d.ratio_before))}`)
@@ -151,7 +148,7 @@ function Siblings({ siblings, id }) {
             <svg width="100%" height="16" aria-hidden="true">
               <line x1="50%" x2="50%" y1="0" y2="16" class="one" />
               <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" class="whisker" />
-              <circle cx={at(s.ratio)} cy="8" r="4" class={s.stands_out ? 'out' : ''} />
+              <circle cx={at(s.ratio)} cy="8" r="4" class={s.stands_out ? 'gap' : 'measured'} />
             </svg>
           ),
           of: format.fixed(s.ratio, 3),

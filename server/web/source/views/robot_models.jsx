@@ -119,7 +119,7 @@ function Version({ of: v, versions, robot, busy, onActivate }) {
   return (
     <li class={v.active ? 'active' : ''}>
       <p>
-        <b>Version {number}</b> {v.active && <span class="flag calm">in force</span>}{' '}
+        <b>Version {number}</b> {v.active && <span class="flag good">in force</span>}{' '}
         <span class="note">
           {format.time(v.created_utime_us)} · from {origins[v.origin] ?? format.words(v.origin)}
         </span>

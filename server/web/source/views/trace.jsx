@@ -5,7 +5,6 @@ import { Chart, axis, lastAt, line, runAxis, withAlpha, withGaps } from '../char
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
-import { palette } from '../theme.js';
 import { Button, Choice, Empty, Key, Panel, Readouts } from '../widgets.jsx';
 import { Motors } from './motors.jsx';
 
@@ -57,8 +56,8 @@ function Charts({ trace, mission, setZoom, setCursor }) {
     bind: { dblclick: () => () => setZoom(null) },
   };
   // `quantities(palette)`: [colour, width, opacity of the band from least to greatest].
-  const maker = (time, value, quantities) => () => {
-    const shown = quantities(palette());
+  const maker = (time, value, quantities) => (p) => {
+    const shown = quantities(p);
     const none = line('transparent');
     return {
       cursor,
@@ -193,7 +192,7 @@ function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
 function ChartsAside({ zoomed, onWhole }) {
   return (
     <>
-      <span class="key">
+      <span class="note key">
         <Key of={{ measured: 'measured', modelled: 'modelled', band: 'minimum to maximum' }} />
       </span>
       {zoomed ? (

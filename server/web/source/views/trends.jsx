@@ -145,8 +145,8 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
     const only = (wanted) => columns.map((c) => c.map((v, k) => (ended(x[k]) === wanted ? v : null)));
     return [x, ...only(true), ...only(false)];
   }, [series, unit]);
-  const make = () => {
-    const colours = coloursOf(palette());
+  const make = (p) => {
+    const colours = coloursOf(p);
     const points = { show: true, size: 6 };
     const wide = 0.7 * (periodMs / 1000);
     return {
@@ -180,7 +180,7 @@ function Names({ series }) {
     'stroke-dasharray': dashes[k % dashes.length].join(' '),
   });
   return (
-    <p class="key trend-key">
+    <p class="note key trend-key">
       {series.map((s, k) => (
         <span key={s.name}>
           <svg width="34" height="8" aria-hidden="true">
