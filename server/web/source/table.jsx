@@ -94,19 +94,23 @@ export const Cells = ({ columns, row }) =>
     ),
   );
 
-// columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by}
-export function Table({ columns, rows, keyOf, sort, onSort, class: name = '', rowClass }) {
+// columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by};
+// `onSort(key)`: of a table that can be sorted.
+export function Table({ columns, rows, keyOf, sort, onSort, class: name = '' }) {
   return (
-    <table class={`grid cards ${name}`}>
-      <Head columns={columns} sort={sort} onSort={onSort} />
-      <tbody>
-        {rows.map((row, k) => (
-          <tr key={keyOf ? keyOf(row) : k} class={rowClass?.(row)}>
-            <Cells columns={columns} row={row} />
-          </tr>
-        ))}
-      </tbody>
-    </table>
+    <>
+      {onSort && <SortChoice columns={columns} sort={sort} onSort={onSort} />}
+      <table class={`grid cards ${name}`}>
+        <Head columns={columns} sort={sort} onSort={onSort} />
+        <tbody>
+          {rows.map((row, k) => (
+            <tr key={keyOf ? keyOf(row) : k}>
+              <Cells columns={columns} row={row} />
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </>
   );
 }
 

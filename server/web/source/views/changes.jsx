@@ -43,8 +43,8 @@ function words({ from, to }) {
   return to === null ? `removed, was ${from}` : `${from} → ${to}`;
 }
 
-export function Changes({ of, none = 'No parameter changes.' }) {
-  if (of.length === 0) return <p class="note">{none}</p>;
+export function Changes({ of }) {
+  if (of.length === 0) return <p class="note">No parameter changes.</p>;
   return (
     <ul class="changes">
       {of.slice(0, mostShown).map((c) => (

@@ -4,7 +4,7 @@ import { useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { robotLink } from '../route.js';
-import { SortChoice, Table, TablePanel, column, figure, sorted, turned } from '../table.jsx';
+import { Table, TablePanel, column, figure, sorted, turned } from '../table.jsx';
 import { Answer, Empty, Facts, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 
 const renewMs = 2000;
@@ -101,17 +101,14 @@ function Leases({ leases }) {
   const onSort = (key) => setSort(turned(sort, key));
   if (leases.length === 0) return <Empty title="No robot has been kept yet" />;
   return (
-    <>
-      <SortChoice columns={leaseColumns} sort={sort} onSort={onSort} />
-      <Table
-        class="leases"
-        columns={leaseColumns}
-        rows={sorted(leases, leaseColumns, sort)}
-        keyOf={(l) => l.robot_id}
-        sort={sort}
-        onSort={onSort}
-      />
-    </>
+    <Table
+      class="leases"
+      columns={leaseColumns}
+      rows={sorted(leases, leaseColumns, sort)}
+      keyOf={(l) => l.robot_id}
+      sort={sort}
+      onSort={onSort}
+    />
   );
 }
 

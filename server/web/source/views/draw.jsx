@@ -10,7 +10,7 @@ const snapped = (v) => Math.round(v / snapM) * snapM;
 
 // A path drawn point by point. Pointer: press adds, drag moves. Keys: arrows move the cross, Enter adds
 // there, Backspace takes the last away.
-export function DrawPath({ points, change, height = 400 }) {
+export function DrawPath({ points, change }) {
   const [acrossM, setAcross] = useState(16);
   const [cross, setCross] = useState(null);
   const held = useRef(null);
@@ -86,7 +86,7 @@ export function DrawPath({ points, change, height = 400 }) {
       <FloorView
         viewFor={viewFor}
         draw={draw}
-        height={height}
+        height={400}
         changes={[points, acrossM, cross]}
         role="application"
         tabindex="0"

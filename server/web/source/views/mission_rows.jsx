@@ -33,7 +33,7 @@ function StateCell({ mission: m }) {
 }
 
 // The columns for `missions`, each energy column in one unit. The service sorts.
-export function missionColumns(missions, models, withRobot) {
+function missionColumns(missions, models, withRobot) {
   const scale = energyScale(missions.flatMap((m) => [m.energy.battery_j, m.energy.modelled_j]));
   const share = (m) => chargeShare(m.energy.charge_ah, models.get(m.robot_id));
   const columns = [

@@ -4,13 +4,12 @@ import { consumption, energy } from '../energy.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';
-import { useModels } from '../models.js';
-import { SortChoice, turned } from '../table.jsx';
+import { turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Button, Empty, Failure, Readouts, missionStates, useTitleOf } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, exportMissions } from './export.jsx';
-import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
+import { MissionTable, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;
 
@@ -135,12 +134,10 @@ function Loaded({ list, total }) {
 
 function List({ given, list, total, sort, onSort }) {
   const rows = list.value.entries;
-  const models = useModels([]);
   const title = choosing(given) ? 'No mission matches' : 'No mission yet';
   return (
     <>
       {list.error && <Failure error={list.error} retry={list.reload} />}
-      <SortChoice columns={missionColumns(rows, models, true)} sort={sort} onSort={onSort} />
       <div class={list.loading ? 'stale' : ''} aria-busy={String(list.loading)}>
         {rows.length === 0 ? (
           <Empty title={title}>
