@@ -1,4 +1,4 @@
-import { useState } from 'preact/hooks';
+import { useRef, useState } from 'preact/hooks';
 import { query } from './api.js';
 
 // "#/missions/12" -> view mission, id 12; "#/missions?state=open" -> view missions, given {state: 'open'}.
@@ -30,10 +30,12 @@ export function keepInAddress(values) {
 // parameter.
 export function useChoices(asked) {
   const [given, setGiven] = useState(asked);
+  const latest = useRef(given); // charts keep the function that they were made with
   const change = (part) => {
-    const next = Object.fromEntries(Object.entries({ ...given, ...part }).filter(([, value]) => value));
-    setGiven(next);
-    keepInAddress(next);
+    const all = Object.entries({ ...latest.current, ...part });
+    latest.current = Object.fromEntries(all.filter(([, value]) => value));
+    setGiven(latest.current);
+    keepInAddress(latest.current);
   };
   return [given, change];
 }

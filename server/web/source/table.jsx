@@ -16,10 +16,16 @@ export function sorted(rows, columns, sort) {
   });
 }
 
-export const turned = (sort, key, downFirst = false) => ({
-  key,
-  down: sort?.key === key ? !sort.down : downFirst,
-});
+// The order in the address, {key, down}, or the usual one, and a function that sorts by a column; the one
+// that it is sorted by already is turned round.
+export function orderOf(given, change, usual) {
+  const sort = given.sort ? { key: given.sort, down: given.down === '1' } : usual;
+  const onSort = (key) => {
+    const down = sort.key === key ? !sort.down : usual.down;
+    change({ sort: key, down: down ? '1' : '' });
+  };
+  return [sort, onSort];
+}
 
 function Title({ column, sort, onSort }) {
   if (!onSort || !column.sort) return column.title;

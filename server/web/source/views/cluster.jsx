@@ -1,10 +1,9 @@
 // The daemons that share the fleet, and the robots that each of them keeps.
-import { useState } from 'preact/hooks';
 import { useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
-import { robotLink } from '../route.js';
-import { Table, TablePanel, column, figure, sorted, turned } from '../table.jsx';
+import { robotLink, useChoices } from '../route.js';
+import { Table, TablePanel, column, figure, orderOf, sorted } from '../table.jsx';
 import { Answer, Empty, Facts, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 
 const renewMs = 2000;
@@ -97,8 +96,7 @@ const ownFacts = [
 ];
 
 function Leases({ leases }) {
-  const [sort, setSort] = useState({ key: 'robot', down: false });
-  const onSort = (key) => setSort(turned(sort, key));
+  const [sort, onSort] = orderOf(...useChoices({}), { key: 'robot', down: false });
   if (leases.length === 0) return <Empty title="No robot has been kept yet" />;
   return (
     <Table

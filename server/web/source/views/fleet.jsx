@@ -17,7 +17,7 @@ import { showRecent, useLive, useModelled } from '../live.js';
 import { useRatios } from '../ratios.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
-import { Cells, Head, SortChoice, column, names, sorted, turned } from '../table.jsx';
+import { Cells, Head, SortChoice, column, names, orderOf, sorted } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import {
   Button,
@@ -316,10 +316,7 @@ export function Fleet({ given: asked }) {
   const [given, change] = useChoices(asked);
   const { find: text = '' } = given;
   const only = given.show in filters ? given.show : 'all';
-  const sort = {
-    key: columns.some((c) => c.key === given.sort) ? given.sort : 'health',
-    down: given.down === '1',
-  };
+  const [sort, onSort] = orderOf(given, change, { key: 'health', down: false });
   const [whole, setWhole] = useState(false);
   const ratios = useRatios(useModelled());
   const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
@@ -337,10 +334,6 @@ export function Fleet({ given: asked }) {
         </Empty>
       </>
     );
-  const onSort = (key) => {
-    const next = turned(sort, key);
-    change({ sort: next.key, down: next.down ? '1' : '' });
-  };
   return (
     <>
       <h1 class="hidden">Fleet</h1>

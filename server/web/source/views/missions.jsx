@@ -4,7 +4,7 @@ import { consumption, energy } from '../energy.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';
-import { turned } from '../table.jsx';
+import { orderOf } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Button, Empty, Failure, Readouts, missionStates, useTitleOf } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
@@ -156,7 +156,7 @@ export function Missions({ given: asked }) {
   useTitleOf('Missions');
   const [given, change] = useChoices(asked);
   const filter = useMemo(() => filterOf(given), [given]);
-  const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
+  const [sort, onSort] = orderOf(given, change, { key: 'start', down: true });
   const order = { sort: sortNames[sort.key] ?? sort.key, order: sort.down ? 'desc' : 'asc' };
   const none = misordered(given.from, given.to);
   const list = useNewest(none ? null : '/v1/missions', { ...filter, ...order }, pageRows);
@@ -164,10 +164,6 @@ export function Missions({ given: asked }) {
   const refresh = () => {
     list.reload();
     totals.reload();
-  };
-  const onSort = (key) => {
-    const next = turned(sort, key, true);
-    change({ sort: next.key, down: next.down ? '1' : '' });
   };
   const total = totals.value?.missions ?? null;
   return (

@@ -4,7 +4,7 @@ import { query, useGet } from '../api.js';
 import { Chart, axis, lastAt, line, runAxis, withAlpha, withGaps } from '../chart.jsx';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
-import { keepInAddress } from '../route.js';
+import { useChoices } from '../route.js';
 import { Button, Choice, Empty, Key, Panel, Readouts } from '../widgets.jsx';
 import { Motors } from './motors.jsx';
 
@@ -204,31 +204,12 @@ function ChartsAside({ zoomed, onWhole }) {
   );
 }
 
-// The zoom and the colouring, as the address keeps them.
-function useView(given) {
-  const zoomed = [given.from, given.to].map(Number);
-  const [view, setView] = useState({
-    zoom: given.to && zoomed.every(Number.isFinite) ? zoomed : null,
-    colouring: given.colour === 'gap' ? 'gap' : 'power',
-  });
-  const latest = useRef(view); // charts keep the functions that they were made with
-  const change = (part) => {
-    const next = (latest.current = { ...latest.current, ...part });
-    setView(next);
-    const [from, to] = next.zoom ?? [];
-    keepInAddress({
-      from: from?.toFixed(2),
-      to: to?.toFixed(2),
-      colour: next.colouring === 'gap' ? 'gap' : '',
-    });
-  };
-  return [view, change];
-}
-
-export function TracePanels({ mission, whole, fine, given }) {
-  const [{ zoom, colouring }, change] = useView(given);
+export function TracePanels({ mission, whole, fine, given: asked }) {
+  const [given, change] = useChoices(asked);
   const [cursor, setCursor] = useState(null);
-  const setZoom = (next) => change({ zoom: next });
+  const ends = [given.from, given.to].map(Number);
+  const zoom = given.to && ends.every(Number.isFinite) ? ends : null;
+  const setZoom = (next) => change({ from: next?.[0].toFixed(2), to: next?.[1].toFixed(2) });
   const utime = (second) => Math.round(mission.start_utime_us + second * 1e6);
   const window = zoom && { from_utime_us: utime(zoom[0]), to_utime_us: utime(zoom[1]) };
   const closer = useGet(
@@ -262,8 +243,8 @@ export function TracePanels({ mission, whole, fine, given }) {
           trace={trace}
           cursor={cursor}
           measured={measured}
-          colouring={colouring}
-          setColouring={(next) => change({ colouring: next })}
+          colouring={given.colour === 'gap' ? 'gap' : 'power'}
+          setColouring={(to) => change({ colour: to === 'gap' ? to : '' })}
         />
       </div>
       <Motors mission={mission} zoom={zoom} />
