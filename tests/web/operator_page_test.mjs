@@ -1654,9 +1654,9 @@ await check('the help contains the glossary', async () => {
   await go(page, '#/help');
   const text = await readFile(path.join(given.page, 'source/help.md'), 'utf8');
   const glossary = text.slice(text.indexOf('## Glossary'));
-  await page.locator('.glossary').last().locator('th').first().waitFor();
+  await page.locator('.glossary').last().locator('dt').first().waitFor();
   equal(
-    await page.locator('.glossary').last().locator('th').count(),
+    await page.locator('.glossary').last().locator('dt').count(),
     glossary.match(/^- \*\*/gm).length,
     'terms',
   );

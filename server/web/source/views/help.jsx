@@ -1,6 +1,6 @@
 // The help: the text of help.md, of which each section is a list of terms or a paragraph.
 import text from '../help.md';
-import { Facts, Heading, useTitleOf } from '../widgets.jsx';
+import { Heading, useTitleOf } from '../widgets.jsx';
 
 const oneLine = (lines) => lines.replaceAll(/\s+/g, ' ').trim();
 const sections = text
@@ -12,8 +12,16 @@ const termsOf = (lines) => [...lines.matchAll(/^- \[?\*\*(.+?)\*\*(?:\]\((.+?)\)
 function Section({ lines }) {
   const terms = termsOf(lines);
   if (terms.length === 0) return <p>{oneLine(lines)}</p>;
-  const rows = terms.map(([, term, to, words]) => [to ? <a href={to}>{term}</a> : term, oneLine(words)]);
-  return <Facts class="glossary" rows={rows} />;
+  return (
+    <dl class="glossary">
+      {terms.map(([, term, to, words]) => (
+        <div key={words}>
+          <dt>{to ? <a href={to}>{term}</a> : term}</dt>
+          <dd>{oneLine(words)}</dd>
+        </div>
+      ))}
+    </dl>
+  );
 }
 
 export function Help() {
