@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -90,7 +89,7 @@ std::string number(double x) {
 double standing_power_w(const SpeedGrid& grid) {
   double sum = grid.electric.idle_w;
   for (const std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = grid.load(0)[s];
+    const WheelLoad w = grid.load(0)[s].whole();
     const double torque = w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck;
     sum += grid.electric.copper_w_n2_m2[s] * torque * torque;
   }
@@ -247,11 +246,11 @@ SpeedGrid RunPlanner::grid_over(const std::vector<double>& nodes) const {
   grid.voltage_limit_v = voltage_limit_v();
   grid.electric = loads_->electric();
   if (uniform_) {
-    grid.loads = {loads_here_};
+    grid.loads = {in_cell(loads_here_)};
   } else {
     grid.loads.reserve(n);
     for (std::size_t k = 0; k < n; ++k) {
-      grid.loads.push_back(loads_->at(*run_, run_->at(0.5 * (nodes[k] + nodes[k + 1]))));
+      grid.loads.push_back(in_cell(loads_->at(*run_, run_->at(0.5 * (nodes[k] + nodes[k + 1])))));
     }
     add_end_loads(nodes, grid);
   }
@@ -290,7 +289,7 @@ void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     // The slope of the curvature and the direction of a wheel may jump at a node.
     const auto within = [&](double share) {
-      return loads_->at(*run_, run_->at(nodes[k] + share * grid.step[k]));
+      return in_cell(loads_->at(*run_, run_->at(nodes[k] + share * grid.step[k])));
     };
     grid.end_loads.push_back({within(1e-6), within(1 - 1e-6)});
   }
@@ -310,7 +309,7 @@ Result<void> RunPlanner::check_feasible() const {
   }
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     for (std::size_t s : {0u, 1u}) {
-      const WheelLoad& w = grid.load(k)[s];
+      const WheelLoad w = grid.load(k)[s].whole();
       const double standing = std::fabs(w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck);
       if (standing >= grid.torque_limit_nm) {
         return fail(Fault::infeasible, "limits/current_a",
@@ -563,9 +562,10 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
   FastMotion fastest;
   std::vector<double> nodes = rough_solver_ ? rough_nodes_ : nodes_;
   SpeedSolver& first = rough_solver_ ? *rough_solver_ : *solver_;
-  SpeedGrid grid = first.grid();
+  SpeedGrid finer;
   SpeedEnvelope e = first.envelope();
   for (int round = 0; round == 0 || (round <= most_rounds && e.feasible); ++round) {
+    const SpeedGrid& grid = round == 0 ? first.grid() : finer;
     SpeedSolution s;
     s.z = e.fastest, s.duration_s = e.shortest_s;
     const auto binds = [&](Bound bound, double share) {
@@ -579,22 +579,20 @@ const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
             std::fabs(s.z[k + 1] - s.z[k]) / (2 * grid.step[k] * grid.acceleration_limit));
       binds(Bound::current, use.current), binds(Bound::voltage, use.voltage);
     }
-    std::vector<double> lost_s = lost_at_ends_s(grid, s.z, uses);
+    Losses lost{lost_at_ends_s(grid, s.z, uses), lost_at_corners_s(grid, s.z)};
     // The first and the last cell could hold the faster of their ends' speeds but for the acceleration.
     for (const std::size_t k : {std::size_t{0}, grid.cells() - 1}) {
-      if (lost_s[k] > 0) continue;
+      if (lost.by_parts[k] > 0) continue;
       const double faster = std::sqrt(std::max(s.z[k], s.z[k + 1])), mean = mean_speed(s.z[k], s.z[k + 1]),
                    ramp_s = 2 * (faster - mean) / grid.acceleration_limit;
-      lost_s[k] = (1 / mean - 1 / faster) * std::max(0.0, grid.step[k] - ramp_s * mean);
+      lost.by_parts[k] = (1 / mean - 1 / faster) * std::max(0.0, grid.step[k] - ramp_s * mean);
     }
-    const std::vector<double> corners_s = lost_at_corners_s(grid, s.z);
-    for (std::size_t k = 0; k < lost_s.size(); ++k) lost_s[k] += corners_s[k];
     const double most_s = lost_tolerance * s.duration_s;
     const std::vector<double> parts = least_parts(grid, nodes, s.z, round == 0 ? 2 : 1);
     fastest = {std::move(nodes), std::move(s)};
-    if (sum_of(lost_s) <= most_s && std::ranges::max(parts) == 1) break;
-    nodes = split(fastest.nodes, lost_s, 0.8 * most_s, parts);
-    grid = grid_over(nodes), e = speed_envelope(grid);
+    if (lost.sum() <= most_s && std::ranges::max(parts) == 1) break;
+    nodes = split(fastest.nodes, lost, 0.8 * most_s, parts);
+    finer = grid_over(nodes), e = speed_envelope(finer);
   }
   return fastest_.emplace(std::move(fastest));
 }
@@ -681,7 +679,7 @@ std::vector<double> RunPlanner::least_parts(const SpeedGrid& grid, const std::ve
   std::vector<double> parts(grid.cells(), least);
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     const double q = (z[k + 1] - z[k]) / (2 * grid.step[k]);
-    const auto beyond = [&](const WheelLoads& loads, double way) {
+    const auto beyond = [&](const CellLoads& loads, double way) {
       return motor_use(grid, loads, std::sqrt(z[k] + 2 * q * (way - nodes[k])), q).most() - 1;
     };
     const double middle = beyond(grid.load(k), nodes[k] + 0.5 * grid.step[k]);
@@ -690,7 +688,8 @@ std::vector<double> RunPlanner::least_parts(const SpeedGrid& grid, const std::ve
     if (grid.end_loads.empty() || middle < -near_limits) continue;
     for (auto knot = knot_after(nodes[k]); knot->way < nodes[k + 1] && parts[k] != at_knots; ++knot) {
       for (const double side : {-1e-9, 0.0}) {
-        const WheelLoads here = loads_->at(*run_, {*knot, run_->at(knot->way + side).curvature_slope});
+        const CellLoads here =
+            in_cell(loads_->at(*run_, {*knot, run_->at(knot->way + side).curvature_slope}));
         if (beyond(here, knot->way) > over_between_rows) parts[k] = at_knots;
       }
     }
@@ -698,17 +697,23 @@ std::vector<double> RunPlanner::least_parts(const SpeedGrid& grid, const std::ve
   return parts;
 }
 
-// Divides cells into parts so that their losses add up to at most `most`. A cell's loss is inversely
-// proportional to the number of its parts, so that the fewest nodes result from parts proportional to the
-// square root of the loss. New nodes are at knots where some are near, for between knots loads change evenly.
-std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const std::vector<double>& lost,
-                                      double most, const std::vector<double>& least) const {
+// Divides cells into parts so that their losses add up to at most `most`. The fewest parts whose losses add
+// up to A, falling with the number of a cell's parts, and to B, with its square, are proportional to sqrt(a)
+// and cbrt(b): sum(sqrt(a))^2/A and sqrt(sum(cbrt(b))^3/B) of them, in proportion to which `most` is shared.
+// New nodes are at knots where some are near, for between knots loads change evenly.
+std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const Losses& lost, double most,
+                                      const std::vector<double>& least) const {
   constexpr double most_parts = 8;
-  double roots = 0;
-  for (const double each : lost) roots += std::sqrt(each);
+  double roots = 1e-100, cubes = 1e-100;
+  for (const double each : lost.by_parts) roots += std::sqrt(each);
+  for (const double each : lost.by_square) cubes += std::cbrt(each);
+  const double all = roots * roots / most + cubes * std::sqrt(cubes / most);
   std::vector<double> finer{nodes.front()};
-  for (std::size_t k = 0; k < lost.size(); ++k) {
-    const double wanted = std::ceil(std::sqrt(lost[k]) * roots / most - 0.5);
+  for (std::size_t k = 0; k + 1 < nodes.size(); ++k) {
+    const double wanted =
+        std::ceil(std::max(std::sqrt(lost.by_parts[k]) * all / roots,
+                           std::cbrt(lost.by_square[k]) * std::sqrt(all / std::sqrt(cubes * most))) -
+                  0.5);
     const bool knots = least[k] == at_knots;
     const double parts =
         nodes.size() > most_cells ? 1 : std::min(knots ? wanted : std::max(wanted, least[k]), most_parts);
@@ -789,7 +794,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     if (due && !s.converged) s = solve_rough_grid(price_w, stop);
   }
   int iterations = s.iterations;
-  std::vector<double> driven, lost;
+  std::vector<double> driven;
+  Losses lost;
   // A coarse solution is the starting point of the fine one, determines the placement of its nodes, and
   // yields its error.
   for (int round = 0; s.converged; ++round) {
@@ -799,7 +805,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     const bool grown = round == most_rounds ||
                        nodes_.size() >= (uniform_ ? most_uniform_growth : most_growth) * rough_nodes_.size();
     const std::vector<double> parts = least_parts(solver_->grid(), nodes_, s.z, refined_ ? 1 : 2);
-    if (refined_ && (grown || (sum_of(lost) <= most && std::ranges::max(parts) == 1))) break;
+    if (refined_ && (grown || (lost.sum() <= most && std::ranges::max(parts) == 1))) break;
     const std::vector<double> coarse_nodes = nodes_;
     const auto rebuild = [&](std::vector<double> onto) {
       const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
@@ -832,7 +838,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   if (!s.converged) driven = driven_j(nodes_, s.z), s.gap_j = s.cost_j, s.convex = false;
   s.iterations = iterations;
   s.cost_j = sum_of(driven) + s.price_w * s.duration_s;
-  discretisation_j_ = coarse_error_ * std::fabs(s.cost_j) + sum_of(lost);
+  discretisation_j_ = coarse_error_ * std::fabs(s.cost_j) + lost.sum();
   return s;
 }
 
@@ -858,14 +864,14 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
 
 // Cost of each cell beyond the solver's estimate: loads and the flow of power change within it; time lost at
 // corners; limits of motors at its ends [J].
-std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector<double>& driven) const {
-  std::vector<double> lost = driven;
-  const std::vector<double> reckoned = solver_->costs_j(s.z, s.price_w),
-                            corners_s = lost_at_corners_s(solver_->grid(), s.z);
-  for (std::size_t k = 0; k < lost.size(); ++k) {
+RunPlanner::Losses RunPlanner::lost_j(const SpeedSolution& s, const std::vector<double>& driven) const {
+  Losses lost{s.ends_j, lost_at_corners_s(solver_->grid(), s.z)};
+  lost.by_parts.resize(driven.size());
+  const std::vector<double> reckoned = solver_->costs_j(s.z, s.price_w);
+  for (std::size_t k = 0; k < driven.size(); ++k) {
     const double time_j = s.price_w * solver_->grid().step[k] / mean_speed(s.z[k], s.z[k + 1]);
-    lost[k] = std::max(0.0, lost[k] + time_j - reckoned[k]) + s.price_w * corners_s[k] +
-              (s.ends_j.empty() ? 0 : s.ends_j[k]);
+    lost.by_parts[k] += std::max(0.0, driven[k] + time_j - reckoned[k]);
+    lost.by_square[k] *= s.price_w;
   }
   return lost;
 }

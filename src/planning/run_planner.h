@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <stop_token>
 #include <vector>
@@ -94,7 +95,15 @@ class RunPlanner {
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop,
                                    const std::optional<Due>& due);
   std::vector<double> driven_j(const std::vector<double>& nodes, const std::vector<double>& z) const;
-  std::vector<double> lost_j(const SpeedSolution& s, const std::vector<double>& driven) const;
+  // Of each cell: what falls with the number of parts that it is divided into, and with its square.
+  struct Losses {
+    std::vector<double> by_parts, by_square;
+    double sum() const {
+      return std::accumulate(by_parts.begin(), by_parts.end(), 0.0) +
+             std::accumulate(by_square.begin(), by_square.end(), 0.0);
+    }
+  };
+  Losses lost_j(const SpeedSolution& s, const std::vector<double>& driven) const;
   RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes) const;
   bool motors_break(double speed, double acceleration) const;
   bool motors_hold(double top, double most) const;
@@ -108,7 +117,7 @@ class RunPlanner {
   std::vector<Knot>::const_iterator knot_after(double way) const {
     return std::ranges::upper_bound(run_->knots, way, {}, &Knot::way);
   }
-  std::vector<double> split(const std::vector<double>& nodes, const std::vector<double>& lost, double most,
+  std::vector<double> split(const std::vector<double>& nodes, const Losses& lost, double most,
                             const std::vector<double>& least) const;
   void add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid) const;
   std::vector<double> first_nodes(std::size_t cells) const;

@@ -13,7 +13,6 @@ constexpr double just_below = 1e-9;  // a limit, relative
 
 // Torque of a wheel without smoothing.
 double torque_of(const WheelLoad& w, double v, double q) {
-  if (w.quadratic()) return w.inertia * q + w.t0 + w.f0 + v * (w.t1 + w.f1 + v * (w.t2 + w.f2));
   const double direction = w.direction(v);
   double through = w.inertia * q + w.t0 + direction * w.t_dry + v * (w.t1 + v * w.t2);
   if (w.scrub != 0) through += w.scrub * std::tanh(v / w.scrub_speed);
@@ -24,10 +23,18 @@ double torque_of(const WheelLoad& w, double v, double q) {
 
 }  // namespace
 
-MotorUse motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q) {
+CellLoads in_cell(const WheelLoads& loads) {
+  const auto kept = [](const WheelLoad& w) -> CellLoad {
+    return {w.pace,      w.inertia,   w.t0 + w.f0,
+            w.t1 + w.f1, w.t2 + w.f2, w.quadratic() ? nullptr : std::make_shared<const WheelLoad>(w)};
+  };
+  return {kept(loads[0]), kept(loads[1])};
+}
+
+MotorUse motor_use(const SpeedGrid& grid, const CellLoads& loads, double v, double q) {
   MotorUse use;
   for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = loads[s];
+    const CellLoad& w = loads[s];
     const Electric& e = grid.electric;
     const auto reach = [&](double t) {
       const double volts =
@@ -38,8 +45,8 @@ MotorUse motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, dou
       };
       reaches(t / grid.torque_limit_nm, use.current), reaches(volts / grid.voltage_limit_v, use.voltage);
     };
-    reach(torque_of(w, v, q));
-    if (w.creep != 0) reach(torque_of(w.rolling(), v, q));
+    reach(w.full ? torque_of(*w.full, v, q) : w.inertia * q + w.f0 + v * (w.f1 + v * w.f2));
+    if (w.full && w.full->creep != 0) reach(torque_of(w.full->rolling(), v, q));
   }
   return use;
 }
@@ -53,11 +60,11 @@ MotorUse motor_use(const SpeedGrid& grid, std::size_t cell, double z0, double z1
           0.5 * std::fabs(first.most() - last.most())};
 }
 
-Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share) {
+Reachable reachable(const SpeedGrid& grid, const CellLoads& loads, double v, double share) {
   Reachable may;
   const Electric& e = grid.electric;
   for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = loads[s];
+    const WheelLoad w = loads[s].whole();
     double low = -std::fabs(w.inertia) * grid.acceleration_limit + w.t0,
            high = std::fabs(w.inertia) * grid.acceleration_limit + w.t0;
     const auto grows_to = [&](double most) { (most < 0 ? low : high) += most; };

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -88,12 +87,12 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
   assert(n >= 2 && grid_.ceiling.size() == n + 1);
   set_return(grid_.electric.down);
   cells_.resize(n);
-  for (auto* v : {&z_, &trial_, &gradient_, &slope_, &stationarity_, &by_price_, &diagonal_, &off_,
-                  &magnitude_, &pivot_, &lower_, &step_})
+  for (auto* v : {&z_, &trial_, &by_z_, &push_, &stationarity_, &diagonal_, &off_, &magnitude_, &gradient_,
+                  &slope_, &by_price_, &pivot_, &lower_, &step_})
     v->assign(n + 1, 0);
   bounds_.assign(n, 0);
   first_bound_.assign(n + 1, 0);
-  for (const WheelLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
+  for (const CellLoads& loads : grid_.loads) scrubs_ = scrubs_ || loads[0].whole().scrub != 0;
   const std::vector<double> fastest = fastest_within(grid_, grid_.ceiling, grid_.acceleration_limit);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = k > 0 ? bits(of_ceiling) : 0;
@@ -114,6 +113,7 @@ SpeedSolver::SpeedSolver(SpeedGrid grid) : grid_(std::move(grid)), floor_(floor_
     first_bound_[k + 1] = first_bound_[k] + static_cast<std::size_t>(std::popcount(mask));
   }
   bound_states_.resize(first_bound_.back());
+  duals_.resize(bound_states_.size() + 2 * n);
 }
 
 const SpeedEnvelope& SpeedSolver::envelope() {
@@ -126,15 +126,9 @@ void SpeedSolver::set_return(double down) {
   half_jump_ = 0.5 * (grid_.electric.up - down);
 }
 
-inline SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
-  if (!w.quadratic()) return torque_in_full(w, v, q);
-  const double linear = w.t1 + w.f1, square = w.t2 + w.f2;
-  return {w.inertia * q + w.t0 + w.f0 + v * (linear + v * square),
-          linear + 2 * square * v,
-          w.inertia,
-          2 * square,
-          0,
-          0};
+inline SpeedSolver::Torque SpeedSolver::torque(const CellLoad& w, double v, double q) const {
+  if (w.full) return torque_in_full(*w.full, v, q);
+  return {w.inertia * q + w.f0 + v * (w.f1 + v * w.f2), w.f1 + 2 * w.f2 * v, w.inertia, 2 * w.f2, 0, 0};
 }
 
 SpeedSolver::Torque SpeedSolver::torque_in_full(const WheelLoad& w, double v, double q) const {
@@ -174,20 +168,6 @@ SpeedSolver::Torque SpeedSolver::torque_in_full(const WheelLoad& w, double v, do
   return r;
 }
 
-double SpeedSolver::cost(std::size_t cell, double v, double q) const {
-  const Electric& e = grid_.electric;
-  double f = idle_ / v;
-  for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = grid_.load(cell)[s];
-    const Torque t = torque(w, v, q);
-    double energy = (e.copper_w_n2_m2[s] * t.t / v + e.back_emf * w.pace) * t.t;
-    if (e.brush_w_nm != 0) energy += e.brush_w_nm * smooth_size(t.t) / v;
-    f += mean_slope_ * energy;
-    if (half_jump_ != 0) f += half_jump_ * std::sqrt(energy * energy + smoothing_ * smoothing_);
-  }
-  return f * grid_.step[cell];
-}
-
 // visit(index, g, g0, g1, g00, g01, g11) for each bound g <= 0 of the cell, with its derivatives by z0 and
 // z1.
 template <class Visit>
@@ -223,8 +203,10 @@ void SpeedSolver::each_bound(std::size_t cell, const Node& first, const Node& la
     for (const std::size_t s : {0u, 1u}) {
       const unsigned of_torque = bound_of(end, s, false), of_voltage = bound_of(end, s, true);
       if (!(mask & (bits(of_torque) | bits(of_voltage)))) continue;
-      const WheelLoad& w = grid_.load(cell, end)[s];
-      const Torque creeping = torque(w, v, q), rolling = w.creep != 0 ? torque(w.rolling(), v, q) : creeping;
+      const CellLoad& w = grid_.load(cell, end)[s];
+      const Torque creeping = torque(w, v, q), rolling = w.full && w.full->creep != 0
+                                                             ? torque_in_full(w.full->rolling(), v, q)
+                                                             : creeping;
       const Electric& e = grid_.electric;
       const double emf = e.voltage_constant_v_s_rad * w.pace / grid_.voltage_limit_v,
                    ohm = e.resistance_ohm[s] / e.torque_constant_nm_a / grid_.voltage_limit_v;
@@ -239,38 +221,12 @@ void SpeedSolver::each_bound(std::size_t cell, const Node& first, const Node& la
   }
 }
 
-bool SpeedSolver::inside(const std::vector<double>& z) const {
-  bool ok = true;
-  for (std::size_t k = 0; k < grid_.cells() && ok; ++k)
-    each_bound(k, Node(z[k]), Node(z[k + 1]), [&](unsigned, double g, auto...) { ok = ok && g < 0; });
-  return ok;
-}
-
-// Cost less mu times the logarithms of all slacks; infinite outside.
-double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
-  double sum = 0;
-  Logarithms logs;
-  Node first(z[0]);
-  for (std::size_t k = 0; k < grid_.cells(); ++k) {
-    const Node last(z[k + 1]);
-    bool ok = true;
-    each_bound(k, first, last, [&](unsigned, double g, auto...) {
-      ok = ok && g < 0;
-      if (ok) logs.add(-g);
-    });
-    if (!ok) return std::numeric_limits<double>::infinity();
-    sum += cost(k, 0.5 * (first.v + last.v), (last.z - first.z) / (2 * grid_.step[k]));
-    first = last;
-  }
-  return sum - mu * logs.sum();
-}
-
 void SpeedSolver::start_from(const std::vector<double>& z) {
   assert(z.size() == z_.size());
   for (const double share : {0.9999, 0.999, 0.99, 0.95}) {
     z_ = z;
     for (std::size_t k = 1; k < grid_.cells(); ++k) z_[k] = floor_[k] + share * (z[k] - floor_[k]);
-    started_ = inside(z_);
+    started_ = assemble(z_);
     if (started_) break;
   }
 }
@@ -284,7 +240,7 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
   l.f = idle_ * i, l.fv = -l.f * i, l.fvv = -2 * l.fv * i;
   l.dual_v = l.fv;
   for (std::size_t s : {0u, 1u}) {
-    const WheelLoad& w = grid_.load(k)[s];
+    const CellLoad& w = grid_.load(k)[s];
     const Torque t = torque(w, v, q);
     const double rho = e.copper_w_n2_m2[s];
     double density = rho * t.t * i;                    // rho T/v
@@ -308,11 +264,11 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
     const double eqq = bend * t.tq * t.tq + slope * t.tqq;
     double first = mean_slope_, second = 0;
     if (half_jump_ != 0) {
-      const double square = energy * energy + smoothing_ * smoothing_, r = 1 / std::sqrt(square);
+      const double size = std::sqrt(energy * energy + smoothing_ * smoothing_), r = 1 / size;
       c.energy[s].steepness = r;
       first += half_jump_ * energy * r;
       second = half_jump_ * std::max(0.0, 1 - c.kink[s] * energy * r) * r;
-      l.f += half_jump_ * square * r;
+      l.f += half_jump_ * size;
     }
     l.f += mean_slope_ * energy;
     l.fv += first * ev, l.fq += first * eq;
@@ -326,20 +282,18 @@ SpeedSolver::Local SpeedSolver::local(std::size_t k) {
   return l;
 }
 
-// Gradient and tridiagonal Hessian of the Lagrangian with the bounds condensed, at z_.
-void SpeedSolver::assemble(double mu) {
-  cost_here_ = kink_gap_ = products_ = 0;
-  Logarithms logs;
+// A profile with the present duals: its merit, and what the next step is found from; false outside the
+// bounds.
+bool SpeedSolver::assemble(const std::vector<double>& z) {
+  cost_ = kink_gap_ = products_ = 0;
+  Logarithms logarithms;
   const std::size_t n = grid_.cells();
-  std::fill(gradient_.begin(), gradient_.end(), 0.0);
-  std::fill(stationarity_.begin(), stationarity_.end(), 0.0);
-  std::fill(diagonal_.begin(), diagonal_.end(), 0.0);
-  std::fill(off_.begin(), off_.end(), 0.0);
-  std::fill(magnitude_.begin(), magnitude_.end(), 0.0);
-  Node first(z_[0]);
+  for (auto* v : {&by_z_, &push_, &stationarity_, &diagonal_, &off_, &magnitude_})
+    std::fill(v->begin(), v->end(), 0.0);
+  Node first(z[0]);
   for (std::size_t k = 0; k < n; ++k) {
     Cell& c = cells_[k];
-    const Node last(z_[k + 1]);
+    const Node last(z[k + 1]);
     const double h = grid_.step[k], p = 0.5 / h;
     c.v = 0.5 * (first.v + last.v), c.q = (last.z - first.z) * p;
     Local l = local(k);
@@ -348,45 +302,45 @@ void SpeedSolver::assemble(double mu) {
     const double v0 = 0.25 * first.pace, v1 = 0.25 * last.pace, v00 = -0.5 * v0 * first.pace * first.pace,
                  v11 = -0.5 * v1 * last.pace * last.pace;
     c.by_z0 = v0, c.by_z1 = v1;
-    cost_here_ += l.f * h;
+    cost_ += l.f * h;
     const double lv = l.dual_v * h, lq = l.dual_q * h;  // of the Lagrangian
-    gradient_[k] += l.fv * v0 - l.fq * p, gradient_[k + 1] += l.fv * v1 + l.fq * p;
+    by_z_[k] += l.fv * v0 - l.fq * p, by_z_[k + 1] += l.fv * v1 + l.fq * p;
     stationarity_[k] += lv * v0 - lq * p, stationarity_[k + 1] += lv * v1 + lq * p;
     const double mixed = l.fvq * p;
     double d0 = l.fvv * v0 * v0 - 2 * mixed * v0 + l.fqq * p * p,
            d1 = l.fvv * v1 * v1 + 2 * mixed * v1 + l.fqq * p * p,
            d01 = l.fvv * v0 * v1 + mixed * (v0 - v1) - l.fqq * p * p;
     BoundState* state = bound_states_.data() + first_bound_[k];
+    double least = 1;
     each_bound(k, first, last,
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
-                 const double slack = -g, y = state->multiplier, inverse = 1 / slack, weight = y * inverse,
-                              push = mu * inverse;
-                 *state++ = {y, slack, g0, g1, mu, j};
-                 logs.add(slack);
+                 const double slack = -g, y = state->multiplier, inverse = 1 / slack, weight = y * inverse;
+                 *state++ = {y, slack, g0, g1, 0, j};
+                 least = std::min(least, slack);
+                 logarithms.add(slack);
+                 products_ += y * slack;
                  d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
                      d01 += weight * g0 * g1 + y * g01;
-                 gradient_[k] += push * g0, gradient_[k + 1] += push * g1;
+                 push_[k] += inverse * g0, push_[k + 1] += inverse * g1;
                  stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
                });
-    for (const BoundState& b : bounds_of(k)) products_ += b.multiplier * b.slack;
+    if (!(least > 0)) return false;
     diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
     off_[k] += d01;
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
         magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
     first = last;
   }
-  merit_here_ = cost_here_ - mu * logs.sum();
-  slope_ = gradient_;
+  logarithms_ = logarithms.sum();
+  return true;
 }
 
-// LDL' of the tridiagonal matrix over the inner nodes; false when it is not positive definite.
-bool SpeedSolver::factorise() {
-  const std::size_t n = grid_.cells();
-  pivot_[1] = diagonal_[1];
-  if (!(pivot_[1] > least_pivot * magnitude_[1])) return false;
-  for (std::size_t k = 2; k < n; ++k) {
-    lower_[k] = off_[k - 1] / pivot_[k - 1];
-    pivot_[k] = diagonal_[k] - lower_[k] * off_[k - 1];
+// LDL' of the tridiagonal matrix over the inner nodes, a share of its diagonal's terms added; false when that
+// is not positive definite.
+bool SpeedSolver::factorise(double share) {
+  for (std::size_t k = 1; k < grid_.cells(); ++k) {
+    lower_[k] = k > 1 ? off_[k - 1] / pivot_[k - 1] : 0;
+    pivot_[k] = diagonal_[k] + share * magnitude_[k] - (k > 1 ? lower_[k] * off_[k - 1] : 0);
     if (!(pivot_[k] > least_pivot * magnitude_[k])) return false;
   }
   return true;
@@ -419,7 +373,7 @@ double SpeedSolver::follow_price(double due_s) {
   after += duration;
   const double change = std::clamp((after - due_s) / fall, -0.5 * idle_, idle_);
   idle_ += change;
-  cost_here_ += change * duration, merit_here_ += change * duration;
+  cost_ += change * duration;
   for (std::size_t k = 1; k < n; ++k) {
     const double slope = change * by_z[k];
     gradient_[k] += slope, slope_[k] += slope, stationarity_[k] += slope;
@@ -437,7 +391,7 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
   const double top = *std::max_element(fastest.begin(), fastest.end());
   double standing = idle_, viscous = 1e-300, losses = 0;
   for (std::size_t s : {0u, 1u}) {
-    const dynamics::QuadraticPower p = motor_power(e, s, grid_.load(n / 2)[s]);
+    const dynamics::QuadraticPower p = motor_power(e, s, grid_.load(n / 2)[s].whole());
     standing += p.c0, viscous += std::max(0.0, p.c2), losses += p.c1;
   }
   // Without a limit on acceleration the fastest profile jumps; start on one with a copper loss equal to the
@@ -453,7 +407,7 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
       const double top_here = std::min(fastest[k], std::max(gentle[k], 2 * slowest[k]));
       z[k] = slowest[k] + share * (top_here - slowest[k]);
     }
-    if (inside(z)) return z;
+    if (assemble(z)) return z;
     share = 0.7 * share + (attempt % 2 ? 0.0 : 0.29);
   }
   // Between two profiles there may be none that motors can follow: the fastest within a part of the limits.
@@ -463,7 +417,7 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) {
     for (double* limit : {&tight.acceleration_limit, &tight.torque_limit_nm, &tight.voltage_limit_v})
       *limit *= part;
     z = speed_envelope(tight).fastest;
-    if (z[0] == grid_.start && z[n] == grid_.end && inside(z)) break;
+    if (z[0] == grid_.start && z[n] == grid_.end && assemble(z)) break;
   }
   return z;
 }
@@ -472,8 +426,8 @@ SpeedSolver::BarrierSchedule::BarrierSchedule(const SpeedGrid& grid, double boun
                                               double tolerance, double gap)
     : tolerance_(tolerance), bounds_(bounds), scale_(cost_j + 1e-300) {
   for (double h : grid.step) length_ += h;
-  for (const WheelLoad& w : grid.load(grid.cells() / 2))
-    torque_nm_ = std::max(torque_nm_, std::fabs(w.t0) + std::fabs(w.f0) + 0.1 * std::fabs(w.inertia));
+  for (const CellLoad& w : grid.load(grid.cells() / 2))
+    torque_nm_ = std::max(torque_nm_, std::fabs(w.f0) + 0.1 * std::fabs(w.inertia));
   mu_ = gap * scale_ / bounds_;
   finest_ = std::max(tolerance_, finest_gap) * scale_ / bounds_;
 }
@@ -484,11 +438,10 @@ void SpeedSolver::BarrierSchedule::follow(double cost_j) {
   finest_ = std::max(tolerance_, finest_gap) * scale_ / bounds_;
 }
 
-bool SpeedSolver::BarrierSchedule::lower(double decrement, double step_length) {
+void SpeedSolver::BarrierSchedule::lower(double decrement, double step_length) {
   const bool solved = step_length > 0.9, quick = solved && decrement < mu_ * bounds_;
-  if (at_finest() || !(solved || decrement < 10 * mu_ * bounds_)) return false;
+  if (at_finest() || !(solved || decrement < 10 * mu_ * bounds_)) return;
   mu_ = std::max(finest_, (quick ? quick_decrease : barrier_decrease) * mu_);
-  return true;
 }
 
 double SpeedSolver::BarrierSchedule::kink_width() const {
@@ -513,21 +466,16 @@ void SpeedSolver::start_duals(double mu) {
 
 // The matrix of the step, made positive definite if necessary; false if that fails.
 bool SpeedSolver::regularise(double damping, bool& corrected) {
-  const std::size_t n = grid_.cells();
-  const auto add_to_diagonal = [&](double share) {
-    for (std::size_t k = 1; k < n; ++k) diagonal_[k] += share * magnitude_[k];
-  };
   corrected = false;
-  if (damping > 0) add_to_diagonal(damping);
-  for (double add = std::max(first_correction, damping); !factorise(); add *= correction_growth) {
+  for (double share = damping; !factorise(share);
+       share = std::max(first_correction, correction_growth * share)) {
     corrected = true;
-    add_to_diagonal(add);
-    if (add > 1e12) return false;
+    if (share > 1e12) return false;
   }
   return true;
 }
 
-std::vector<double> SpeedSolver::cost_of_ends() const {
+std::vector<double> SpeedSolver::cost_of_ends() {
   if (!bounds_motors_) return {};
   std::vector<double> cost(grid_.cells(), 0);
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
@@ -550,7 +498,7 @@ double SpeedSolver::stationarity_residual() const {
 }
 
 // Longest step that keeps a share of every bound's slack, the motors' linearised: N&W (19.9).
-double SpeedSolver::step_to_boundary() const {
+double SpeedSolver::step_to_boundary() {
   double used = to_boundary;  // the largest share of a slack by the whole step
   for (std::size_t k = 0; k < grid_.cells(); ++k)
     for (const BoundState& b : bounds_of(k))
@@ -576,10 +524,11 @@ double SpeedSolver::centre(double mu) {
     for (std::size_t k = 0; k < grid_.cells(); ++k) {
       for (BoundState& b : bounds_of(k)) {
         const double change = b.change(step_[k], step_[k + 1]), s = b.slack, y = b.multiplier;
-        const double moved = (s - aim * change) * (y * s + aim * (b.target + y * (change - s)));  // times s
+        const double moved =
+            (s - aim * change) * (y * s + aim * (mu + b.raised + y * (change - s)));  // times s
         if (moved >= least_product * mu * s) continue;
         const double lacking = least_product * mu - moved / s;
-        b.target += lacking;
+        b.raised += lacking;
         raised_.push_back({&b, lacking});
         slope_[k] += lacking / s * b.by_z0, slope_[k + 1] += lacking / s * b.by_z1;
       }
@@ -589,7 +538,7 @@ double SpeedSolver::centre(double mu) {
     const double length = step_to_boundary(), now = length * decrement();
     if (!(now > promised)) {
       step_ = trial_;
-      for (const auto& [bound, by] : raised_) bound->target -= by;
+      for (const auto& [bound, by] : raised_) bound->raised -= by;
       break;
     }
     longest = length, promised = now;
@@ -597,40 +546,55 @@ double SpeedSolver::centre(double mu) {
   return longest;
 }
 
-// Backtracks until the barrier function falls enough; 0 when it does not. The accepted point is in trial_.
-double SpeedSolver::line_search(double longest, double decrement, double mu, double scale) {
-  const double noise = 1e-13 * scale;
+// Backtracks until the barrier function falls enough; 0 when it does not. The accepted point is assembled, in
+// trial_: the longest step with the smoothing of the barrier that follows it, which makes no cost greater; a
+// shorter one keeps the barrier.
+double SpeedSolver::line_search(double longest, double decrement, BarrierSchedule& barrier) {
+  const double mu = barrier.mu(), from = merit(mu), noise = 1e-13 * barrier.scale();
+  BarrierSchedule after = barrier;
+  after.lower(decrement, longest);
   double length = longest;
   for (int halving = 0; halving < 30; ++halving) {
+    smooth(after);
     for (std::size_t k = 0; k <= grid_.cells(); ++k) trial_[k] = z_[k] + length * step_[k];
-    if (merit(trial_, mu) <= merit_here_ - sufficient_decrease * length * decrement + noise) return length;
+    if (assemble(trial_) && merit(mu) <= from - sufficient_decrease * length * decrement + noise) {
+      barrier = after;
+      return length;
+    }
+    after = barrier;
     length *= halving < 2 ? 0.6 : 0.3;
   }
+  smooth(barrier);
   return 0;
 }
 
 // Multipliers and the kinks' slopes follow their linearised equations along the step.
-void SpeedSolver::update_duals() {
-  // Each multiplier keeps a share of itself: one that ends at zero does not shorten the others' steps.
-  const auto follow = [](double& multiplier, double change) {
-    multiplier = std::max((1 - to_boundary) * multiplier, multiplier + change);
-  };
+void SpeedSolver::update_duals(double mu) {
+  auto before = duals_.begin();
   for (std::size_t k = 0; k < grid_.cells(); ++k) {
     Cell& c = cells_[k];
     const double dv = c.by_z0 * step_[k] + c.by_z1 * step_[k + 1];
     const double dq = (step_[k + 1] - step_[k]) / (2 * grid_.step[k]);
-    for (BoundState& b : bounds_of(k))
-      follow(b.multiplier,
-             (b.target + b.multiplier * b.change(step_[k], step_[k + 1])) / b.slack - b.multiplier);
-    if (half_jump_ != 0) follow_kinks(c, dv, dq);
+    for (BoundState& b : bounds_of(k)) {
+      const double y = *before++ = b.multiplier;
+      // It keeps a share of itself: one that ends at zero does not shorten the others' steps.
+      b.multiplier =
+          std::max((1 - to_boundary) * y, (mu + b.raised + y * b.change(step_[k], step_[k + 1])) / b.slack);
+    }
+    before = std::copy(c.kink.begin(), c.kink.end(), before);
+    for (std::size_t s = 0; s < 2 && half_jump_ != 0; ++s) {
+      const Energy& e = c.energy[s];
+      const double change = (1 - c.kink[s] * e.j * e.steepness) * (e.by_v * dv + e.by_q * dq);
+      c.kink[s] = std::clamp((e.j + change) * e.steepness, -1.0, 1.0);
+    }
   }
 }
 
-void SpeedSolver::follow_kinks(Cell& c, double dv, double dq) const {
-  for (std::size_t s : {0u, 1u}) {
-    const Energy& e = c.energy[s];
-    c.kink[s] = std::clamp(
-        (e.j + (1 - c.kink[s] * e.j * e.steepness) * (e.by_v * dv + e.by_q * dq)) * e.steepness, -1.0, 1.0);
+void SpeedSolver::restore_duals() {
+  auto before = duals_.begin();
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
+    for (BoundState& b : bounds_of(k)) b.multiplier = *before++;
+    for (double& kink : cells_[k].kink) kink = *before++;
   }
 }
 
@@ -652,8 +616,10 @@ std::vector<double> SpeedSolver::costs_j(const std::vector<double>& z, double pr
   idle_ = grid_.electric.idle_w + price_w;
   smoothing_ = 0;
   std::vector<double> costs(grid_.cells());
-  for (std::size_t k = 0; k < grid_.cells(); ++k)
-    costs[k] = cost(k, mean_speed(z[k], z[k + 1]), (z[k + 1] - z[k]) / (2 * grid_.step[k]));
+  for (std::size_t k = 0; k < grid_.cells(); ++k) {
+    cells_[k].v = mean_speed(z[k], z[k + 1]), cells_[k].q = (z[k + 1] - z[k]) / (2 * grid_.step[k]);
+    costs[k] = local(k).f * grid_.step[k];
+  }
   return costs;
 }
 
@@ -698,28 +664,28 @@ void SpeedSolver::finish(SpeedSolution& solution, double price_w) {
 SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance, const std::stop_token& stop,
                                    const std::optional<Due>& due) {
   SpeedSolution solution;
-  idle_ = grid_.electric.idle_w + price_w;
-  smoothing_ = torque_smoothing_ = 0;
+  torque_smoothing_ = 0;
   started_ = false;
   way_.clear();
   z_.front() = grid_.start, z_.back() = grid_.end;
-  if (!inside(z_)) return solution;
-  BarrierSchedule barrier(grid_, static_cast<double>(bound_states_.size()), std::fabs(merit(z_, 0)),
+  finish(solution, price_w);
+  BarrierSchedule barrier(grid_, static_cast<double>(bound_states_.size()), std::fabs(solution.cost_j),
                           tolerance, gap);
-  const auto smooth = [&] { smoothing_ = barrier.kink_width(), torque_smoothing_ = barrier.torque_width(); };
-  smooth();
+  smooth(barrier);
   start_duals(barrier.mu());
+  if (!assemble(z_)) return {};
   double damping = 0;
   bool corrected = false;
   int settling = 0;
   for (int iteration = 0; iteration < most_iterations && !stop.stop_requested(); ++iteration) {
     solution.iterations = iteration + 1;
-    assemble(barrier.mu());
     // Tolerances follow the cost as it falls, so that the answer does not depend on where the search began.
-    barrier.follow(cost_here_);
+    barrier.follow(cost_);
+    for (std::size_t k = 0; k <= grid_.cells(); ++k)
+      slope_[k] = gradient_[k] = by_z_[k] + barrier.mu() * push_[k];
     if (!regularise(damping, corrected)) break;
     solve_step(slope_, step_);
-    const double late_s = due ? follow_price(due->duration_s) : 0;
+    const double idle = idle_, late_s = due ? follow_price(due->duration_s) : 0;
     if (due && idle_ > grid_.electric.idle_w + due->most_w) break;
     const double left = products_, allowed = tolerance * barrier.scale();
     solution.residual = stationarity_residual() / barrier.scale();
@@ -732,20 +698,19 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
       solution.convex = !scrubs_ && grid_.electric.down >= 0 && !corrected && damping == 0;
       break;
     }
-    const double longest = centre(barrier.mu()), falls = decrement(),
-                 length = line_search(longest, falls, barrier.mu(), barrier.scale());
+    const double longest = centre(barrier.mu()), falls = decrement(), passed = barrier.gap();
+    update_duals(barrier.mu());
+    const double length = line_search(longest, falls, barrier);
     if (length == 0) {
       if (damping > 1e6) break;
       damping = std::max(first_damping, 10 * damping);
+      restore_duals(), idle_ = idle;
+      assemble(z_);
       continue;
     }
-    update_duals();
     std::swap(z_, trial_);
     if (length > 0.5) damping = damping > first_damping ? 0.1 * damping : 0;
-    const double passed = barrier.gap();
-    if (!barrier.lower(falls, length)) continue;
-    way_.push_back({passed, z_});
-    smooth();
+    if (barrier.gap() < passed) way_.push_back({passed, z_});
   }
   if (!solution.converged) way_.clear();
   last_idle_ = idle_;

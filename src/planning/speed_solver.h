@@ -85,7 +85,7 @@ class SpeedSolver {
   // voltage.
   struct BoundState {
     double multiplier = 0, slack = 0, by_z0 = 0, by_z1 = 0;
-    double target = 0;  // that multiplier times slack is led to: mu or more
+    double raised = 0;  // above mu, that multiplier times slack is led to
     unsigned index = 0;
 
     double change(double dz0, double dz1) const { return by_z0 * dz0 + by_z1 * dz1; }
@@ -101,7 +101,7 @@ class SpeedSolver {
     double scale() const { return scale_; }  // the cost that tolerances are shares of
     bool at_finest() const { return mu_ <= finest_; }
     void follow(double cost_j);
-    bool lower(double decrement, double step_length);
+    void lower(double decrement, double step_length);
     double kink_width() const;    // of the energy over the way [J/x]
     double torque_width() const;  // [N m]
 
@@ -117,21 +117,15 @@ class SpeedSolver {
     double t, tv, tq, tvv, tvq, tqq;
   };
   Torque torque_in_full(const WheelLoad& w, double v, double q) const;
-  Torque torque(const WheelLoad& w, double v, double q) const;
-  double cost(std::size_t cell, double v, double q) const;
+  Torque torque(const CellLoad& w, double v, double q) const;
   double smooth_size(double torque_nm) const {  // |torque|, smooth at zero
     return std::sqrt(torque_nm * torque_nm + torque_smoothing_ * torque_smoothing_);
   }
   std::span<BoundState> bounds_of(std::size_t cell) {
     return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
   }
-  std::span<const BoundState> bounds_of(std::size_t cell) const {
-    return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
-  }
   template <class Visit>
   void each_bound(std::size_t cell, const Node& first, const Node& last, Visit&& visit) const;
-  double merit(const std::vector<double>& z, double mu) const;
-  bool inside(const std::vector<double>& z) const;
   std::vector<double> initial_point(std::optional<double> share = {});
   void set_return(double down);
   void finish(SpeedSolution& solution, double price_w);
@@ -139,19 +133,21 @@ class SpeedSolver {
                         const std::optional<Due>& due);
   void start_duals(double mu);
   Local local(std::size_t cell);
-  void assemble(double mu);
-  bool factorise();
+  bool assemble(const std::vector<double>& z);
+  double merit(double mu) const { return cost_ - mu * logarithms_; }
+  bool factorise(double share);
   bool regularise(double damping, bool& corrected);
   void solve_step(const std::vector<double>& slope, std::vector<double>& step) const;
   double follow_price(double due_s);
-  std::vector<double> cost_of_ends() const;
+  std::vector<double> cost_of_ends();
   double stationarity_residual() const;
-  double step_to_boundary() const;
+  double step_to_boundary();
   double decrement() const;
   double centre(double mu);
-  double line_search(double longest, double decrement, double mu, double scale);
-  void update_duals();
-  void follow_kinks(Cell& cell, double dv, double dq) const;
+  double line_search(double longest, double decrement, BarrierSchedule& barrier);
+  void smooth(const BarrierSchedule& b) { smoothing_ = b.kink_width(), torque_smoothing_ = b.torque_width(); }
+  void update_duals(double mu);
+  void restore_duals();
   std::array<bool, bound_count> binding(double unit_j) const;
 
   const SpeedGrid grid_;
@@ -172,11 +168,14 @@ class SpeedSolver {
   double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
-  std::vector<double> gradient_, slope_, stationarity_, by_price_, diagonal_, off_, magnitude_, pivot_,
-      lower_, step_;
-  double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
-  double products_ = 0;                    // sum of multipliers times slacks
-  double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
+  // Of the profile that was assembled last: derivatives of the cost, of the sum of logarithms, of the
+  // Lagrangian, and its Hessian with the bounds condensed.
+  std::vector<double> by_z_, push_, stationarity_, diagonal_, off_, magnitude_;
+  double cost_ = 0, logarithms_ = 0;  // smoothed; sum of those of the slacks
+  double products_ = 0;               // sum of multipliers times slacks
+  double kink_gap_ = 0;               // how far the dual slopes bound phi from below [J]
+  std::vector<double> gradient_, slope_, by_price_, pivot_, lower_, step_;
+  std::vector<double> duals_;  // multipliers and kinks' slopes where the step begins
   bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
 };
 
