@@ -23,27 +23,28 @@ Eigen::Map<const Square> square(const std::array<Features, feature_count>& m) {
   return Eigen::Map<const Square>(m.front().data());
 }
 
-Features moving_features(Motion motion, double payload_fraction, double amount, const LegCost& cost) {
+Features moving_features(Motion motion, double payload_fraction, double amount, const LegCost& cost,
+                         const Correction& now) {
   Features x{};
-  x[payload_feature] = amount * payload_fraction;
-  if (motion == Motion::turn) x[2] = amount;
-  if (motion == Motion::drive) {
-    x[1] = amount;
-    x[4] = amount * (cost.speed_fraction - middle_speed);
-  }
+  if (motion == Motion::stand) return x;
+  const std::size_t moving = motion == Motion::turn ? 2 : 1;
+  x[moving] = amount;
+  x[payload_feature] = amount * payload_fraction * now.mean[moving];
+  if (motion == Motion::drive) x[4] = amount * (cost.speed_fraction - middle_speed);
   return x;
 }
 
 }  // namespace
 
-Features features_of(Motion motion, double payload_fraction, const LegCost& cost) {
-  Features x = moving_features(motion, payload_fraction, cost.motor_j, cost);
+Features features_of(Motion motion, double payload_fraction, const LegCost& cost, const Correction& now) {
+  Features x = moving_features(motion, payload_fraction, cost.motor_j, cost, now);
   x[0] = cost.standing_j;
   return x;
 }
 
-Features duration_features_of(Motion motion, double payload_fraction, const LegCost& cost) {
-  Features x = moving_features(motion, payload_fraction, cost.duration_s, cost);
+Features duration_features_of(Motion motion, double payload_fraction, const LegCost& cost,
+                              const Correction& now) {
+  Features x = moving_features(motion, payload_fraction, cost.duration_s, cost, now);
   x[0] = cost.runs_on;
   return x;
 }
@@ -58,7 +59,7 @@ double Correction::variance_j2(const Features& x) const {
 
 Correction untried(Subject subject) {
   Correction prior;
-  constexpr Features energies{0.155, 0.35, 1.1, 0.29, 0.19}, durations{0.1, 0.055, 0.045, 0.01, 0.04};
+  constexpr Features energies{0.155, 0.35, 1.1, 0.2, 0.19}, durations{0.1, 0.055, 0.045, 0.01, 0.04};
   const Features& deviation = is_duration(subject) ? durations : energies;
   if (is_duration(subject)) prior.mean[0] = 0;
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
@@ -66,7 +67,7 @@ Correction untried(Subject subject) {
     prior.covariance[a][b] = prior.covariance[b][a] = by * deviation[a] * deviation[b];
   };
   if (!is_duration(subject))
-    correlate(1, 2, 0.8), correlate(1, payload_feature, 0.5), correlate(2, payload_feature, 0.5);
+    correlate(1, 2, 0.8), correlate(1, payload_feature, 0.65), correlate(2, payload_feature, 0.7);
   return prior;
 }
 

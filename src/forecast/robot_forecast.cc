@@ -89,13 +89,13 @@ void Forecaster::count(PlanSum& sum, Subject subject, Motion motion, const Featu
 
 void Forecaster::extend(PlanSum& sum, const PricedLeg& leg, double copies) const {
   const double loaded = payload_limit_kg > 0 ? leg.payload_kg / payload_limit_kg : 0;
-  const Features x = features_of(leg.motion, loaded, leg.cost);
   const bool stands = leg.motion == Motion::stand;
-  count(sum, energy_of(stands ? Driving::stated : leg.driving), leg.motion, x, copies);
+  const Subject energy = energy_of(stands ? Driving::stated : leg.driving), time = duration_of(leg.driving);
+  count(sum, energy, leg.motion, features_of(leg.motion, loaded, leg.cost, track(energy).correction), copies);
   if (stands)
     sum.stated_s += copies * leg.cost.duration_s;
   else
-    count(sum, duration_of(leg.driving), leg.motion, duration_features_of(leg.motion, loaded, leg.cost),
+    count(sum, time, leg.motion, duration_features_of(leg.motion, loaded, leg.cost, track(time).correction),
           copies);
   if (leg.may_halt) sum.stops[leg.motion == Motion::turn ? 1 : 0] += copies;
   sum.duration_s += copies * leg.cost.duration_s;
@@ -119,11 +119,9 @@ Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subje
     }
     if (!(part > 0)) continue;
     p.legs += part;
-    estimate += t.correction.variance_j2(sum.features[s]);
-    // Scores of missions without payload do not narrow the uncertainty that payload adds.
+    // Scores show the scatter about a learned correction: they do not narrow the uncertainty of this one.
     const double narrowed = std::min(1.0, t.inflation * t.scores.deviation());
-    estimate += (1 / (narrowed * narrowed) - 1) * t.correction.covariance[payload_feature][payload_feature] *
-                sum.features[s][payload_feature] * sum.features[s][payload_feature];
+    estimate += t.correction.variance_j2(sum.features[s]) / (narrowed * narrowed);
     for (std::size_t k = 0; k < motion_count; ++k)
       variance += t.scatter[k] * t.scatter[k] * sum.squares[s][k];
     common += t.common * part;
@@ -274,8 +272,9 @@ RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& miss
       priced.cost.standing_j += late_s * standing_w_;
     }
     const double loaded = now.payload_limit_kg > 0 ? leg.payload_kg / now.payload_limit_kg : 0;
-    seen.legs.push_back({time ? duration_features_of(leg.motion, loaded, priced.cost)
-                              : features_of(leg.motion, loaded, priced.cost),
+    const Correction& by = now.tracks[s].correction;
+    seen.legs.push_back({time ? duration_features_of(leg.motion, loaded, priced.cost, by)
+                              : features_of(leg.motion, loaded, priced.cost, by),
                          time ? leg.duration_s : leg.battery_j, 0});
     seen.motions.push_back(leg.motion);
     return priced;
