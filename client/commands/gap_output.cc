@@ -108,7 +108,7 @@ void print_gap(const Json& d) {
     fmt::print("gap: {} of the measured energy; mean absolute power error {:.1f} %{}{}\n",
                without_sign_of_zero(fmt::format("{:+.1f} %", percent_at(d, "gap/energy_relative"))),
                percent_at(d, "gap/power_absolute_relative"), in_brackets("noise floor ", d["gap"]),
-               of_motors ? ", of the motors' power with the file's idle power" : "");
+               of_motors ? ", of the motors' power" : "");
   }
   std::string others;
   for (const auto& [name, gap] : member_at(d, "channels").items())

@@ -84,6 +84,26 @@ TEST(VirtualRobot, DerivesPowerFromMotorCurrents) {
   EXPECT_EQ(d.notes.size(), 1u);
 }
 
+// Without battery power the base load of the file is not compared with anything.
+TEST(VirtualRobot, IdlePowerIsNoMeasurement) {
+  made::Robot robot = virtual_missions({{"coulomb_friction", 0.6}}, 12, true, 3);
+  for (telemetry::Recording& mission : robot.recordings.missions)
+    for (auto& s : mission.samples) s.battery_voltage_v = s.battery_current_a = unmeasured;
+  robot.model.idle_power_w = 0;
+  const Diagnosis none = diagnose_robot(robot);
+  robot.model.idle_power_w = 200;
+  const Diagnosis high = diagnose_robot(robot);
+  EXPECT_GT(none.power_absolute_relative, 0.1);
+  EXPECT_NEAR(high.power_absolute_relative, none.power_absolute_relative, 1e-9);
+  EXPECT_NEAR(high.energy_relative, none.energy_relative, 1e-9);
+  EXPECT_NEAR(high.noise_floor, none.noise_floor, 1e-6);
+  for (const Diagnosis* d : {&none, &high}) {
+    EXPECT_EQ(name_of(d->verdict), name_of(none.verdict));
+    ASSERT_EQ(d->effects.size(), 1u);
+    EXPECT_EQ(d->effects[0].id, "coulomb_friction");
+  }
+}
+
 // Battery power only, of a robot with three times the friction of its file and a computer that is absent from
 // the file.
 TEST(VirtualRobot, RecalibratesMismatchedFile) {

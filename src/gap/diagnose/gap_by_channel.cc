@@ -58,9 +58,7 @@ std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit) {
   if (d.power) {
     for (std::size_t r = 0; r < d.rows.size(); ++r)
       battery.add(d.rows.power_w[r] - fit.unchanged_w[ix(r)], d.rows.power_w[r]);
-    const bool of_battery =
-        std::ranges::any_of(d.windows, [](const Window& w) { return std::isfinite(w.battery_power_w); });
-    if (of_battery || !d.motors) battery.report("battery_power", rest_of_power(fit), gaps);
+    if (d.rows.meter.empty()) battery.report("battery_power", rest_of_power(fit), gaps);
   }
   const dynamics::DriveModel model(d.robot, d.in_file);
   const double torque = rest_of(fit, Channel::torque_right), voltage = rest_of(fit, Channel::voltage_right);

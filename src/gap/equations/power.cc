@@ -24,14 +24,4 @@ double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_
   return motor(0) + motor(1);
 }
 
-std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot) {
-  std::vector<double> power;
-  for (const Window& w : windows) power.push_back(w.battery_power_w);
-  if (std::ranges::any_of(power, [](double p) { return std::isfinite(p); })) return power;
-  const bool volts = voltages_read(windows);
-  std::ranges::transform(windows, power.begin(),
-                         [&](const Window& w) { return robot.idle_power_w + motors_power(w, robot, volts); });
-  return power;
-}
-
 }  // namespace joulecast::gap

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "gap/equations/channels.h"
 
@@ -17,9 +16,5 @@ double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_
 // Power of both motors in a window [W]; where no motor's voltage was read at all (`volts_read` false) by the
 // voltages that the file's windings need. NaN without both currents.
 double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_read);
-
-// Battery power of every window [W], NaN where it was not read; where no window has one, the power of the
-// motors and the idle power of the robot file.
-std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

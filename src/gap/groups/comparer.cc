@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numbers>
 #include <set>
 
@@ -55,12 +54,8 @@ class Comparer {
     report(after_compared);
     // A large difference does not indicate another robot.
     if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
-    // Only named effects are compared; without any, the likeliest one.
-    const auto named = [](const posterior::ExplainedBy& e) { return e.group >= posterior::named; };
-    if (std::ranges::any_of(answer_.effects, named))
-      std::erase_if(answer_.effects, std::not_fn(named));
-    else if (answer_.effects.size() > 1)
-      answer_.effects.resize(1);
+    // Only named effects are compared.
+    std::erase_if(answer_.effects, [](const posterior::ExplainedBy& e) { return e.group < posterior::named; });
     measure();
     state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
     for (const std::string& reason : answer_.reasons) c_.diagnosis.reasons.push_back(sentence(reason));

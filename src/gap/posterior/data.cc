@@ -160,16 +160,22 @@ void expect_accelerations(std::span<const windows::Track> tracks, PowerRows& row
       if (std::isfinite(best[k][s])) rows.instants[k].acceleration_rad_s2[s] = best[k][s];
 }
 
-// Windows with a measured power, as rows of one instant.
-PowerRows rows_of(std::span<const Window> windows, std::span<const double> power_w) {
+// Windows with a measured power, as rows of one instant: the battery's, or where no window has one, that of
+// the motors.
+PowerRows rows_of(std::span<const Window> windows, const robot::RobotModel& robot) {
+  const bool volts = voltages_read(windows);
+  const bool battery =
+      std::ranges::any_of(windows, [](const Window& w) { return std::isfinite(w.battery_power_w); });
   PowerRows rows;
   const std::size_t stride = windows.size() / most_windows + 1;
   for (std::size_t k = 0; k < windows.size(); k += stride) {
-    if (!std::isfinite(power_w[k])) continue;
+    const double power_w = battery ? windows[k].battery_power_w : motors_power(windows[k], robot, volts);
+    if (!std::isfinite(power_w)) continue;
     rows.instants.push_back(windows[k]);
-    rows.power_w.push_back(power_w[k]);
+    rows.power_w.push_back(power_w);
     rows.first.push_back(rows.instants.size());
   }
+  if (!battery) rows.meter.assign(rows.size(), Meter::motors);
   return rows;
 }
 
@@ -215,7 +221,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   }
   d.blocks = assign(d.windows, length_s);
   if (d.motors) {
-    d.rows = rows_of(d.windows, measured_power(d.windows, robot));
+    d.rows = rows_of(d.windows, robot);
   } else {
     for (std::size_t m = 0; m < missions.size(); ++m)
       add_readings(tracks[m], period_s[m], voltage_v[m], m, total_s / static_cast<double>(most_power_rows),

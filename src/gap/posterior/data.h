@@ -106,7 +106,7 @@ struct Data {
   std::vector<Eigen::VectorXd> shifts;  // of each table: power of its rows, with a common shift
 
   // True if the rows are instants of recordings, not runs and not groups: power has a table of terms.
-  bool of_instants() const { return conditions.empty() && group.empty() && rows.meter.empty(); }
+  bool of_instants() const { return conditions.empty() && group.empty() && rows.scale.empty(); }
   // True if battery power is the only evidence.
   bool at_readings() const { return power && !motors; }
 };

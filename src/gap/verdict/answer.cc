@@ -102,9 +102,8 @@ void weigh_by_checks(Diagnosis& d) {
 }
 
 PowerSource power_source(const posterior::Data& data) {
-  const auto read = [](const Window& w) { return std::isfinite(w.battery_power_w); };
   if (!data.power) return PowerSource::none;
-  return std::ranges::any_of(data.windows, read) ? PowerSource::battery : PowerSource::motors;
+  return data.rows.meter.empty() ? PowerSource::battery : PowerSource::motors;
 }
 
 void state_offer(const posterior::Fit& fit, const Explained& answer, bool other_channels, Diagnosis& d) {

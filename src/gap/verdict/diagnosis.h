@@ -118,7 +118,7 @@ struct FileCorrection {
   double file = 0, fits = 0, deviation = 0;
 };
 
-// Origin of the gap's power; `motors`: their V i, with the idle power of the robot file.
+// Origin of the gap's power; `motors`: their V i, without the base load.
 enum class PowerSource { battery, motors, none };
 inline constexpr std::array<std::string_view, 3> power_source_names{"battery", "motors", "none"};
 std::string_view name_of(PowerSource source);

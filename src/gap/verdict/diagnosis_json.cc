@@ -290,7 +290,7 @@ const Table<Diagnosis>& diagnosis_table() {
           .later()
           .word(
               "power", [](const D& d) { return name_of(d.power); }, power_source_names,
-              "source of the power; motors: plus the idle power of the robot file")
+              "source of the power; motors: of both motors, without the base load")
           .later()
           .list("checks", &D::checks, "faults of the recordings, most fundamental first", check_table())
           .later()

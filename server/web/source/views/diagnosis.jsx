@@ -271,7 +271,7 @@ const limitsOf = (r) =>
     !r.motor_channels &&
       'Motor currents were not recorded: effects in motors, drivers and friction are harder to distinguish.',
     r.power === 'motors' &&
-      'The battery was not recorded: power is that of the motors plus the idle power of the robot file.',
+      'The battery was not recorded: power is that of the motors, without the base load.',
     r.power === 'none' && 'No power was recorded: effects are estimated from other readings.',
     r.gap.detectable_share > 0 &&
       `An effect of less than ${share(r.gap.detectable_share)} of the power is not detectable.`,
