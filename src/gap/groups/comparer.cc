@@ -55,7 +55,8 @@ class Comparer {
     // A large difference does not indicate another robot.
     if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
     // Only named effects are compared.
-    std::erase_if(answer_.effects, [](const posterior::ExplainedBy& e) { return e.group < posterior::named; });
+    std::erase_if(answer_.effects,
+                  [](const posterior::ExplainedBy& e) { return e.group < posterior::named; });
     measure();
     state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
     for (const std::string& reason : answer_.reasons) c_.diagnosis.reasons.push_back(sentence(reason));
