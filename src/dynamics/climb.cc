@@ -3,18 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace joulecast::dynamics {
 namespace {
 
 constexpr double shortest_stretch_m = 0.5;
 constexpr double stretch_s = 1;
-constexpr double slope_of_grain = 0.01;       // that it may make: as wheels on a hard floor resist
-constexpr std::int64_t apart_us = 2'000'000;  // two readings of a slow receiver
-constexpr double standing_m_s = 0.01;         // encoders of a standing robot show less
-constexpr double jump_grains = 10;            // a larger step than the way explains is the sensor's
-constexpr double finest = 1.0 / 64;           // of the reach: heights closer together are averaged
+constexpr double slope_of_grain =
+    0.01;  // that one usual change of the height may make: as wheels on a hard floor resist
+constexpr double standing_m_s = 0.01;  // encoders of a standing robot show less
+constexpr double jump_grains = 10;     // usual changes: a larger step than the way explains is the sensor's
+constexpr double finest = 1.0 / 64;    // of the reach: heights closer together are averaged
 constexpr std::size_t most_knots = 1024;
 
 // To each of so many sides of the robot.
@@ -39,7 +38,7 @@ double way_between(const ClimbReading& a, const ClimbReading& b) {
          (std::fabs(a.speed_m_s) + std::fabs(b.speed_m_s));
 }
 
-double median(std::vector<double> values) {
+double median(std::span<double> values) {
   if (values.empty()) return 0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -108,41 +107,10 @@ double HeightProfile::slope(double from_m, double to_m) const {
   return 12 * moment / (length * length * length);
 }
 
-bool HeightGrain::learn(double value_m, std::vector<double>& values_m, std::size_t& count) const {
-  if (values_m.size() < most_) values_m.emplace_back();
-  values_m[count++ % most_] = value_m;
-  return true;
-}
-
-bool HeightGrain::add(const ClimbReading& reading) {
-  const ClimbReading before = std::exchange(last_, reading);
-  bool changed = false;
-  if (!reading.bridged || reading.utime_us <= before.utime_us ||
-      !std::isfinite(before.height_m + reading.height_m)) {
-    apart_.clear();
-  } else if (const double way = way_between(before, reading); way > 0) {
-    way_m_ += std::copysign(way, before.speed_m_s + reading.speed_m_s);
-    if (reading.height_m != before.height_m)
-      changed = learn(std::fabs(reading.height_m - before.height_m), change_m_, changes_);
-  }
-  if (!std::isfinite(reading.height_m) ||
-      (!apart_.empty() && reading.utime_us - apart_.back().utime_us < apart_us))
-    return changed;
-  const Place here{reading.utime_us, way_m_, reading.height_m};
-  if (apart_.size() == 2) {
-    const auto [a, b] = std::pair(apart_[0], apart_[1]);
-    const double part = (b.way_m - a.way_m) / (here.way_m - a.way_m);
-    if (part > 0 && part < 1)
-      changed = learn(std::fabs(b.height_m - std::lerp(a.height_m, here.height_m, part)), departure_m_,
-                      departures_);
-    apart_.erase(apart_.begin());
-  }
-  apart_.push_back(here);
-  return changed;
-}
-
-double HeightGrain::grain_m() const {
-  return std::max(median(change_m_), median(departure_m_));
+void ClimbTracker::learn(double step_m) {
+  steps_m_[steps_++ % remembered_steps] = step_m;
+  std::array<double, remembered_steps> sorted = steps_m_;
+  grain_m_ = median({sorted.data(), std::min(steps_, remembered_steps)});
 }
 
 double ClimbTracker::add(const ClimbReading& reading) {
@@ -163,9 +131,12 @@ double ClimbTracker::add(const ClimbReading& reading) {
     direction_ = direction;
   }
   way_m_ += way;
-  if (grain_.add(reading)) grain_m_ = grain_.grain_m();
+  if (!lost && way > 0 && std::isfinite(reading.height_m) && std::isfinite(last_height_m_) &&
+      reading.height_m != last_height_m_)
+    learn(std::fabs(reading.height_m - last_height_m_));
   last_utime_us_ = reading.utime_us;
   last_speed_m_s_ = reading.speed_m_s;
+  last_height_m_ = reading.height_m;
 
   if (!std::isfinite(reading.height_m)) {
     profile_.clear();
@@ -206,6 +177,15 @@ std::vector<Run> runs_of(std::span<const ClimbReading> readings) {
   return runs;
 }
 
+double grain_of(std::span<const ClimbReading> readings) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < readings.size(); ++k) {
+    const double step = std::fabs(readings[k].height_m - readings[k - 1].height_m);
+    if (step > 0 && way_between(readings[k - 1], readings[k]) > 0) steps.push_back(step);
+  }
+  return median(steps);
+}
+
 void climb_of_run(std::span<const ClimbReading> readings, const Run& run, double grain_m,
                   std::span<double> climb_rad) {
   HeightProfile profile;
@@ -225,9 +205,7 @@ void climb_of_run(std::span<const ClimbReading> readings, const Run& run, double
 
 std::vector<double> climb_along(std::span<const ClimbReading> readings) {
   std::vector<double> climb_rad(readings.size(), unknown);
-  HeightGrain grain(readings.size());
-  for (const ClimbReading& reading : readings) grain.add(reading);
-  const double grain_m = grain.grain_m();
+  const double grain_m = grain_of(readings);
   for (const Run& run : runs_of(readings)) {
     const std::size_t count = run.end - run.begin;
     climb_of_run(readings.subspan(run.begin, count), run, grain_m,

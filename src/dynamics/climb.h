@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -13,9 +14,9 @@
 // Heights are held and rounded readings: a height with a resolution of a metre may change by a metre between
 // two samples. The height is therefore taken as a broken line over the distance driven that passes half way
 // between two readings half way between their places. The climb is the slope of its best straight line over a
-// window: half a metre, or the way of one second, or so far to each side (online: behind the robot) that the
-// grain of the heights makes 1 % of slope, whichever is longest. Changes of the height at standstill, and
-// jumps, are attributed to the sensor.
+// window: half a metre, or the way of one second, or so far to each side (online: behind the robot) that one
+// usual change of the reading makes 1 % of slope, whichever is longest. Changes of the height at standstill,
+// and jumps, are attributed to the sensor.
 namespace joulecast::dynamics {
 
 struct ClimbReading {
@@ -54,32 +55,6 @@ class HeightProfile {
   double drift_m_ = 0;  // of the readings while the robot stood, and their jumps
 };
 
-// What a height may be off by without a climb: its usual change from one sample to the next, or its usual
-// departure from the line between two others, two seconds away each, whichever is larger. Loggers interpolate
-// between the readings of a satellite receiver, about one a second: neighbouring samples then differ by a
-// part of the noise.
-class HeightGrain {
- public:
-  // Remembers so many changes and departures.
-  explicit HeightGrain(std::size_t most) : most_(most) {}
-  // Readings in order of time; true if the grain may have changed.
-  bool add(const ClimbReading& reading);
-  double grain_m() const;
-
- private:
-  struct Place {
-    std::int64_t utime_us = 0;
-    double way_m = 0, height_m = 0;
-  };
-  bool learn(double value_m, std::vector<double>& values_m, std::size_t& count) const;
-
-  std::size_t most_, changes_ = 0, departures_ = 0;
-  std::vector<double> change_m_{}, departure_m_{};
-  std::vector<Place> apart_{};  // at most two
-  ClimbReading last_{INT64_MAX};
-  double way_m_ = 0;  // forward positive
-};
-
 // The climb online, from the way behind the robot. Its result is unknown until half a window is driven; at
 // standstill, and until half a window is driven again, it stays unchanged.
 class ClimbTracker {
@@ -88,11 +63,15 @@ class ClimbTracker {
   double add(const ClimbReading& reading);
 
  private:
+  void learn(double step_m);
+
+  static constexpr std::size_t remembered_steps = 63;
   HeightProfile profile_;
-  HeightGrain grain_{63};
+  std::array<double, remembered_steps> steps_m_{};
+  std::size_t steps_ = 0;
   double grain_m_ = 0;
   std::int64_t last_utime_us_ = INT64_MAX;
-  double last_speed_m_s_ = 0;
+  double last_speed_m_s_ = 0, last_height_m_ = unknown;
   double way_m_ = 0;
   int direction_ = 0;  // of the run: 1 forward, -1 backward, 0 not begun
   double climb_rad_ = unknown;

@@ -136,29 +136,6 @@ TEST(Climb, NoiseLengthensTheWindow) {
   EXPECT_LT(worst(online, std::asin(0.03), 400), 0.05);
 }
 
-// Rows between two readings of a receiver that is off by 0.3 m: their own steps are ten times smaller.
-TEST(Climb, InterpolatedNoiseLengthensWindow) {
-  std::mt19937 random(6);
-  std::normal_distribution<double> noise(0, 0.3);
-  auto readings = drive(
-      300, 10, [](double) { return 5.0; }, [](double s) { return 0.03 * s; }, exact);
-  for (std::size_t k = 0; k < readings.size(); k += 10) readings[k].height_m += noise(random);
-  for (std::size_t k = 0; k + 10 < readings.size(); ++k) {
-    const double part = static_cast<double>(k % 10) / 10;
-    readings[k].height_m = std::lerp(readings[k - k % 10].height_m, readings[k - k % 10 + 10].height_m, part);
-  }
-  readings.resize(readings.size() - 10);
-  const auto offline = climb_along(readings), online = tracked(readings);
-  double offline_square = 0, online_square = 0;
-  for (std::size_t k = 500; k < readings.size(); ++k) {
-    offline_square += std::pow(offline[k] - std::asin(0.03), 2);
-    online_square += std::pow(online[k] - std::asin(0.03), 2);
-  }
-  const auto count = static_cast<double>(readings.size() - 500);
-  EXPECT_LT(std::sqrt(offline_square / count), 0.01);  // over half a second it is 0.085
-  EXPECT_LT(std::sqrt(online_square / count), 0.03);
-}
-
 TEST(Climb, HeightAtStandstillIsDrift) {
   // Half a minute of level driving, a minute of standing in which the height creeps up by 2 m, and level
   // driving.

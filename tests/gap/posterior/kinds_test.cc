@@ -100,48 +100,6 @@ TEST(SlowRows, NameClimbAndFriction) {
   EXPECT_TRUE(names(*a, "coulomb_friction")) << name_of(a->verdict);
 }
 
-// Heights of a satellite receiver that reads once a second, with noise, interpolated to the rows: the climb
-// counts in full.
-TEST(ReceiverHeights, GradeIsNotAttenuated) {
-  Drives drives(35);
-  telemetry::RecordingSet recordings = drives.recordings();
-  const dynamics::DriveModel flat(drives.robot, {}), hilly(drives.robot, std::vector{effect_of("grade", 1)});
-  std::mt19937_64 random(35);
-  std::normal_distribution<double> noise(0, 0.05);
-  constexpr std::size_t rows_a_reading = 20;
-  for (telemetry::Recording& mission : recordings.missions) {
-    std::vector<double> height_m{10};
-    double way_m = 0;
-    for (signals::Sample& s : mission.samples) {
-      Window w;
-      w.speed_rad_s = s.wheel_velocity_rad_s;
-      w.battery_voltage_v = 24;
-      w.climb_rad = 0.08 * std::sin(way_m / 6);
-      s.battery_current_a += (metered_powers(hilly, w).battery_w - metered_powers(flat, w).battery_w) / 24;
-      const double step_m =
-          0.05 * drives.robot.kinematics.wheel_radius_m * (w.speed_rad_s[0] + w.speed_rad_s[1]) / 2;
-      way_m += step_m;
-      height_m.push_back(height_m.back() + step_m * std::sin(w.climb_rad));
-    }
-    for (std::size_t k = 0; k < height_m.size(); k += rows_a_reading) height_m[k] += noise(random);
-    signals::CovariateSeries series{"height_m", {}, {}};
-    for (std::size_t k = 0; k < mission.samples.size(); ++k) {
-      const std::size_t from = k - k % rows_a_reading;
-      series.utime_us.push_back(mission.samples[k].utime_us);
-      series.value.push_back(std::lerp(height_m[from],
-                                       height_m[std::min(from + rows_a_reading, height_m.size() - 1)],
-                                       static_cast<double>(k - from) / rows_a_reading));
-    }
-    mission.covariates = {series};
-  }
-  const auto a = explain_recordings(recordings, drives.robot);
-  ASSERT_TRUE(a);
-  const auto grade = std::ranges::find(a->effects, "grade", &ExplainedBy::id);
-  ASSERT_NE(grade, a->effects.end());
-  EXPECT_GT(grade->group, 0.9);
-  EXPECT_NEAR(grade->parameters.front().value, 1, 0.15);
-}
-
 // A file with twice the friction of the robot: the estimate is half of the file's.
 TEST(DetectionLimit, SeesTooMuchFriction) {
   Drives drives(32);
