@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "history/schema.h"
@@ -16,12 +17,12 @@ std::string text_of(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-// False if the text is not the JSON of such a value.
-template <class T>
-bool read_json(const std::string& text, T& value) try {
+// False if the text is not the JSON of such a value, or one of its elements is not valid.
+template <class T, class Valid>
+bool read_json(const std::string& text, T& value, Valid is_valid) try {
   const json document = json::parse(text);
   document.get_to(value);
-  return document == json(value);
+  return std::ranges::all_of(document, is_valid);
 } catch (const json::exception&) {
   return false;
 }
@@ -66,7 +67,7 @@ void bind_value(Rows& rows, const std::vector<std::array<double, 2>>& places) {
 }
 
 bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts) {
-  return read_json(rows.text(), counts);
+  return read_json(rows.text(), counts, &json::is_number_integer);
 }
 
 bool read_value(Rows& rows, std::vector<CovariateSummary>& covariates) {
@@ -87,11 +88,11 @@ bool read_value(Rows& rows, std::vector<CovariateSummary>& covariates) {
 }
 
 bool read_value(Rows& rows, std::vector<MissionKey>& keys) {
-  return read_json(rows.text(), keys);
+  return read_json(rows.text(), keys, &json::is_number_integer);
 }
 
 bool read_value(Rows& rows, std::vector<std::array<double, 2>>& places) {
-  return read_json(rows.text(), places);
+  return read_json(rows.text(), places, [](const json& place) { return place.size() == 2; });
 }
 
 BulkRows::BulkRows(std::string table, std::string columns,

@@ -316,7 +316,8 @@ export function Fleet({ given: asked }) {
   const [given, change] = useChoices(asked);
   const { find: text = '' } = given;
   const only = given.show in filters ? given.show : 'all';
-  const [sort, onSort] = orderOf(given, change, { key: 'health', down: false });
+  const known = columns.some((c) => c.key === given.sort); // an address may name another column
+  const [sort, onSort] = orderOf(known ? given : {}, change, { key: 'health', down: false });
   const [whole, setWhole] = useState(false);
   const ratios = useRatios(useModelled());
   const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
