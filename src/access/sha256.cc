@@ -5,7 +5,7 @@
 #include <openssl/hmac.h>
 #include <openssl/rand.h>
 
-#include <charconv>
+#include <boost/algorithm/hex.hpp>
 #include <cstdlib>
 #include <span>
 #include <vector>
@@ -20,28 +20,13 @@ std::string_view as_text(std::span<const unsigned char> bytes) {
 }  // namespace
 
 std::string hexadecimal(std::string_view bytes) {
-  static constexpr char digits[] = "0123456789abcdef";
-  std::string text;
-  text.reserve(2 * bytes.size());
-  for (const char c : bytes) {
-    const auto byte = static_cast<unsigned char>(c);
-    text.push_back(digits[byte >> 4]);
-    text.push_back(digits[byte & 15]);
-  }
-  return text;
+  return boost::algorithm::hex_lower(std::string(bytes));
 }
 
-std::optional<std::string> from_hexadecimal(std::string_view text) {
-  if (text.size() % 2 != 0) return std::nullopt;
-  std::string bytes;
-  for (std::size_t k = 0; k < text.size(); k += 2) {
-    unsigned char byte = 0;
-    const char* end = text.data() + k + 2;
-    if (std::from_chars(text.data() + k, end, byte, 16) != std::from_chars_result{end, std::errc{}})
-      return std::nullopt;
-    bytes.push_back(static_cast<char>(byte));
-  }
-  return bytes;
+std::optional<std::string> from_hexadecimal(std::string_view text) try {
+  return boost::algorithm::unhex(std::string(text));
+} catch (const boost::algorithm::hex_decode_error&) {
+  return std::nullopt;
 }
 
 std::string sha256_hex(std::string_view bytes) {

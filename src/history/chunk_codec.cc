@@ -24,13 +24,6 @@ std::uint64_t unzigzag(std::uint64_t code) {
   return (code >> 1) ^ (0 - (code & 1));
 }
 
-struct FreeCompressor {
-  void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
-};
-struct FreeDecompressor {
-  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
-};
-
 using signals::Sample;
 
 constexpr std::byte sample_chunk_format{1};
@@ -151,7 +144,8 @@ bool ByteReader::doubles(std::span<std::uint64_t> bits) {
 }
 
 void append_compressed(Bytes& out, const Bytes& plain, int level) {
-  thread_local const std::unique_ptr<ZSTD_CCtx, FreeCompressor> context(ZSTD_createCCtx());
+  thread_local const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(),
+                                                                                  ZSTD_freeCCtx);
   if (!context) throw std::bad_alloc();
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
   ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
@@ -165,7 +159,8 @@ void append_compressed(Bytes& out, const Bytes& plain, int level) {
 }
 
 Result<Bytes> decompressed(std::span<const std::byte> frame, std::size_t max_bytes, const char* what) {
-  thread_local const std::unique_ptr<ZSTD_DCtx, FreeDecompressor> context(ZSTD_createDCtx());
+  thread_local const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(),
+                                                                                  ZSTD_freeDCtx);
   if (!context) throw std::bad_alloc();
   const unsigned long long size = ZSTD_getFrameContentSize(frame.data(), frame.size());
   if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN)

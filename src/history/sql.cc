@@ -1,5 +1,7 @@
 #include "history/sql.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -128,13 +130,7 @@ std::string or_replace(std::string_view key, std::string_view columns) {
 }
 
 std::string insert_into(std::string_view table, std::string_view columns) {
-  return std::string("INSERT INTO ")
-      .append(table)
-      .append(" (")
-      .append(columns)
-      .append(") VALUES (")
-      .append(placeholders(columns))
-      .append(")");
+  return fmt::format("INSERT INTO {} ({}) VALUES ({})", table, columns, placeholders(columns));
 }
 
 std::string insert_or_replace(std::string_view table, std::string_view key, std::string_view columns) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "access/sha256.h"
 #include "history/schema.h"
 
 namespace joulecast::history {
@@ -130,15 +131,8 @@ void BulkRows::bind(int parameter, std::string_view value) {
 }
 
 void BulkRows::bind(int parameter, std::span<const std::byte> value) {
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string& text = at(parameter);
-  text = "\"\\\\x";
-  text.reserve(2 * value.size() + 8);
-  for (const std::byte byte : value) {
-    text += digits[std::to_integer<unsigned>(byte) >> 4U];
-    text += digits[std::to_integer<unsigned>(byte) & 15U];
-  }
-  text += '"';
+  const std::string_view bytes(reinterpret_cast<const char*>(value.data()), value.size());
+  at(parameter) = "\"\\\\x" + access::hexadecimal(bytes) + '"';
 }
 
 void BulkRows::step_later() {

@@ -1,18 +1,14 @@
 #include "history/sql_store.h"
 
 #include <algorithm>
-#include <random>
 
+#include "access/sha256.h"
 #include "history/sql_queries.h"
 
 namespace joulecast::history {
 
 std::string new_writer_name() {
-  std::random_device random;
-  std::string name = "joulecast-";
-  constexpr std::string_view digits = "0123456789abcdef";
-  for (int k = 0; k < 16; ++k) name += digits[random() % digits.size()];
-  return name;
+  return "joulecast-" + access::random_hex(8);
 }
 
 // After a failed connection: there may be many callers, and each attempt may take long.

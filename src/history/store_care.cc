@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <boost/algorithm/string/replace.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -31,9 +32,7 @@ void add_texts(StoreCheck& check, Database& database, const std::string& sql) {
 }
 
 std::string quoted(const std::string& text) {
-  std::string sql = "'";
-  for (const char c : text) sql += c == '\'' ? std::string("''") : std::string(1, c);
-  return sql + "'";
+  return "'" + boost::replace_all_copy(text, "'", "''") + "'";
 }
 
 Result<OutputFile> new_file(const std::string& path) {
