@@ -60,13 +60,34 @@ struct Place {
   double centre_s, length_s;
 };
 
+// Sets what is a mean over the window's rows in every kind of window.
+template <class Mean>
+void set_means(const Track& c, Mean mean, Window& w) {
+  for (const std::size_t s : {0u, 1u})
+    for (std::size_t q = 0; q < c.heat.size(); ++q) w.copper_heat_w[q][s] = mean(c.heat[q][s]);
+  for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = mean(c.motion[q]);
+  w.battery_voltage_v = mean(c.battery_voltage);
+  w.battery_current_a = mean(c.battery_current);
+  w.battery_power_w = mean(c.battery_power);
+  w.mission_voltage_v = c.mean_battery_voltage_v;
+  w.charge_as = mean(c.charge);
+  w.payload_kg = mean(c.payload);
+  w.yaw_rate_rad_s = mean(c.yaw_rate);
+  w.climb_rad = mean(c.climb);
+  w.x_m = mean(c.x);
+  w.y_m = mean(c.y);
+  w.heading_rad = mean(c.heading);
+  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(mean(covariate));
+}
+
 Window window_at(const Track& c, const Place& at) {
   const Kernel kernel(c.time_s, at.first, at.last, at.centre_s, at.length_s);
   Window w;
   w.t_s = at.centre_s;
   w.length_s = at.length_s;
   w.part_weight = kernel.part_weight();
-  w.payload_kg = kernel.mean(c.payload);
+  set_means(
+      c, [&](const std::vector<double>& v) { return kernel.mean(v); }, w);
   for (const std::size_t s : {0u, 1u}) {
     w.speed_rad_s[s] = kernel.mean(c.speed[s]);
     w.acceleration_rad_s2[s] = kernel.slope(c.speed[s]);
@@ -96,21 +117,8 @@ Window window_at(const Track& c, const Place& at) {
     w.braking_w[s] = kernel.mean(c.braking[s]);
     // At rest the reading is noise about nothing.
     w.current_sign[s] = w.resting[s] ? 0.0 : kernel.mean(c.current_sign[s]);
-    for (std::size_t q = 0; q < c.heat.size(); ++q) w.copper_heat_w[q][s] = kernel.mean(c.heat[q][s]);
   }
-  for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = kernel.mean(c.motion[q]);
-  w.battery_voltage_v = kernel.mean(c.battery_voltage);
-  w.mission_voltage_v = c.mean_battery_voltage_v;
-  w.battery_current_a = kernel.mean(c.battery_current);
-  w.battery_power_w = kernel.mean(c.battery_power);
   w.battery_power_slope_w_s = kernel.slope(c.battery_power);
-  w.charge_as = kernel.mean(c.charge);
-  w.yaw_rate_rad_s = kernel.mean(c.yaw_rate);
-  w.climb_rad = kernel.mean(c.climb);
-  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(kernel.mean(covariate));
-  w.x_m = kernel.mean(c.x);
-  w.y_m = kernel.mean(c.y);
-  w.heading_rad = kernel.mean(c.heading);
   return w;
 }
 
@@ -182,7 +190,6 @@ std::optional<Window> power_row(const Track& c, std::span<const std::size_t> row
       w.acceleration_rad_s2[s] += line.slope * w.part_weight[part] / count;
     }
     w.moving[s] = slowest > moving_rad_s || fastest < -moving_rad_s;
-    for (std::size_t q = 0; q < c.heat.size(); ++q) w.copper_heat_w[q][s] = mean(c.heat[q][s]);
   }
   for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
     w.part_weight[part] /= count;
@@ -190,19 +197,7 @@ std::optional<Window> power_row(const Track& c, std::span<const std::size_t> row
     w.part_speed_rad_s[part] = w.speed_rad_s;
     w.part_acceleration_rad_s2[part] = w.acceleration_rad_s2;
   }
-  for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = mean(c.motion[q]);
-  w.battery_voltage_v = mean(c.battery_voltage);
-  w.battery_current_a = mean(c.battery_current);
-  w.battery_power_w = mean(c.battery_power);
-  w.mission_voltage_v = c.mean_battery_voltage_v;
-  w.charge_as = mean(c.charge);
-  w.payload_kg = mean(c.payload);
-  w.yaw_rate_rad_s = mean(c.yaw_rate);
-  w.climb_rad = mean(c.climb);
-  w.x_m = mean(c.x);
-  w.y_m = mean(c.y);
-  w.heading_rad = mean(c.heading);
-  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(mean(covariate));
+  set_means(c, mean, w);
   return w;
 }
 
