@@ -32,26 +32,16 @@ Recording without_charging(const Recording& recording) {
   const auto charges = [&](double current_a) { return current_a < -flowing_a; };
   const auto begin = std::find_if_not(recording.current_a.begin(), recording.current_a.end(), charges);
   const auto end = std::find_if(begin, recording.current_a.end(), charges);
-  const auto first = begin - recording.current_a.begin(), last = end - recording.current_a.begin();
-  const auto part = [&](const std::vector<double>& column) {
-    return std::vector<double>(column.begin() + first, column.begin() + last);
-  };
-  return {recording.name, part(recording.time_s), part(recording.current_a), part(recording.voltage_v),
-          part(recording.temperature_c)};
+  return recording.rows(begin - recording.current_a.begin(), end - recording.current_a.begin());
 }
 
 // Without the rest before and after, but for one row before.
 Recording without_rests(const Recording& recording) {
   const double flowing_a = 1e-3 * *std::max_element(recording.current_a.begin(), recording.current_a.end());
-  std::size_t first = 1, last = recording.size();
-  while (first + 1 < last && !(recording.current_a[first] > flowing_a)) ++first;
-  while (last > first + 1 && !(recording.current_a[last - 1] > flowing_a)) --last;
-  const auto part = [&](const std::vector<double>& column) {
-    return std::vector<double>(column.begin() + static_cast<std::ptrdiff_t>(first) - 1,
-                               column.begin() + static_cast<std::ptrdiff_t>(last));
-  };
-  return {recording.name, part(recording.time_s), part(recording.current_a), part(recording.voltage_v),
-          part(recording.temperature_c)};
+  auto first = recording.current_a.begin() + 1, last = recording.current_a.end();
+  while (first + 1 < last && !(*first > flowing_a)) ++first;
+  while (last > first + 1 && !(*(last - 1) > flowing_a)) --last;
+  return recording.rows(first - recording.current_a.begin() - 1, last - recording.current_a.begin());
 }
 
 struct SlowTest {

@@ -64,19 +64,19 @@ Result<std::vector<std::optional<std::size_t>>> positions(std::string_view heade
   return found;
 }
 
-void drop_last_row(Recording& recording) {
-  recording.time_s.pop_back();
-  recording.current_a.pop_back();
-  recording.voltage_v.pop_back();
-  recording.temperature_c.pop_back();
-}
-
 }  // namespace
 
 double Recording::charge_ah() const {
   double coulombs = 0;
   for (std::size_t row = 1; row < size(); ++row) coulombs += current_a[row] * duration_s(row);
   return coulombs / 3600;
+}
+
+Recording Recording::rows(std::ptrdiff_t first, std::ptrdiff_t end) const {
+  const auto part = [&](const std::vector<double>& column) {
+    return std::vector<double>(column.begin() + first, column.begin() + end);
+  };
+  return {name, part(time_s), part(current_a), part(voltage_v), part(temperature_c)};
 }
 
 Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name) {
@@ -118,11 +118,13 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
       return invalid("t_s", fmt::format("is {} s in line {}, must not be before the line before, {} s",
                                         value[time_column], line_number, recording.time_s.back()));
     // Loggers that round the time write an extra row at the end of a test in the same second.
-    if (!recording.time_s.empty() && value[time_column] == recording.time_s.back()) drop_last_row(recording);
-    recording.time_s.push_back(value[time_column]);
-    recording.current_a.push_back(value[current_column]);
-    recording.voltage_v.push_back(value[voltage_column]);
-    recording.temperature_c.push_back(value[temperature_column]);
+    const bool again = !recording.time_s.empty() && value[time_column] == recording.time_s.back();
+    std::vector<double>* const row[] = {&recording.time_s, &recording.current_a, &recording.voltage_v,
+                                        &recording.temperature_c};
+    for (std::size_t c = 0; c < cycle_column; ++c) {
+      if (again) row[c]->pop_back();
+      row[c]->push_back(value[c]);
+    }
   }
   if (out.empty()) return invalid("t_s", "has no rows");
   for (const Recording& recording : out)

@@ -22,6 +22,7 @@ struct Recording {
   double duration_s() const { return time_s.back() - time_s.front(); }
   double duration_s(std::size_t row) const { return time_s[row] - time_s[row - 1]; }  // row >= 1
   double charge_ah() const;                                                           // drawn in all
+  Recording rows(std::ptrdiff_t first, std::ptrdiff_t end) const;
 };
 
 // Reads CSV with a header line that names t_s, I_A and V_V (or time_s, current_a, voltage_v and the like) and
