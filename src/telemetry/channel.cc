@@ -1,4 +1,4 @@
-#include <utility>
+#include <iterator>
 
 #include "signals/ids.h"
 #include "telemetry/codec.h"
@@ -6,17 +6,12 @@
 namespace joulecast::telemetry {
 namespace {
 
-constexpr std::pair<Subject, std::string_view> prefixes[] = {{Subject::telemetry, "ROBOT_TELEMETRY."},
-                                                             {Subject::mission_event, "MISSION_EVENT."},
-                                                             {Subject::covariates, "ROBOT_COVARIATES."},
-                                                             {Subject::energy_state, "ENERGY_STATE."}};
+// In the order of Subject.
+constexpr std::string_view prefixes[] = {"ROBOT_TELEMETRY.", "MISSION_EVENT.", "ROBOT_COVARIATES.",
+                                         "ENERGY_STATE."};
 
 std::string_view prefix_of(Subject subject) noexcept {
-  std::string_view found;
-  for (const auto& [known, prefix] : prefixes) {
-    if (known == subject) found = prefix;
-  }
-  return found;
+  return prefixes[static_cast<std::size_t>(subject)];
 }
 
 }  // namespace
@@ -26,11 +21,11 @@ std::string channel_of(Subject subject, std::string_view robot_id) {
 }
 
 std::optional<ChannelName> parse_channel(std::string_view channel) noexcept {
-  for (const auto& [subject, prefix] : prefixes) {
-    if (!channel.starts_with(prefix)) continue;
-    const std::string_view robot_id = channel.substr(prefix.size());
+  for (std::size_t k = 0; k < std::size(prefixes); ++k) {
+    if (!channel.starts_with(prefixes[k])) continue;
+    const std::string_view robot_id = channel.substr(prefixes[k].size());
     if (!signals::is_valid_robot_id(robot_id)) return std::nullopt;
-    return ChannelName{subject, robot_id};
+    return ChannelName{static_cast<Subject>(k), robot_id};
   }
   return std::nullopt;
 }

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/core/noncopyable.hpp>
 #include <cerrno>
 #include <cstring>
 #include <exception>
@@ -26,14 +27,11 @@ constexpr int queue_capacity =
 
 }  // namespace
 
-struct LcmLink::State {
+struct LcmLink::State : boost::noncopyable {
   struct LcmDestroyer {
     void operator()(lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
   };
 
-  State() = default;
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
   ~State() {
     lcm.reset();  // before the handler that it may still call
     if (wake_fd >= 0) ::close(wake_fd);

@@ -1,9 +1,10 @@
 #include "telemetry/validation.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 
 namespace joulecast::telemetry {
 namespace {
@@ -120,10 +121,8 @@ std::string describe(const Implausible& fault) {
   }
   for (const PlausibleRange& range : ranges) {
     if (range.field != fault.field) continue;
-    char numbers[128];
-    std::snprintf(numbers, sizeof numbers, " is %.6g; no robot reports values outside %g to %g", fault.value,
-                  range.low, range.high);
-    text += numbers;
+    text += fmt::format(" is {:.6g}; no robot reports values outside {:g} to {:g}", fault.value, range.low,
+                        range.high);
     if (const std::string_view unit = mistaken_unit(fault, range); !unit.empty())
       text.append("; is it in ").append(unit).append("?");
     return text;
