@@ -2,64 +2,13 @@
 
 #include <fmt/chrono.h>
 
-#include <charconv>
+#include <boost/xpressive/xpressive_dynamic.hpp>
 #include <chrono>
+#include <string>
 
 namespace joulecast {
-namespace {
 
 using namespace std::chrono;
-
-// Takes digits off the front; empty unless there are exactly so many.
-std::optional<int> take_digits(std::string_view& text, std::size_t count) {
-  int value = 0;
-  if (text.size() < count) return std::nullopt;
-  const auto [end, fault] = std::from_chars(text.data(), text.data() + count, value);
-  if (fault != std::errc() || end != text.data() + count || value < 0 || text[0] == '-') return std::nullopt;
-  text.remove_prefix(count);
-  return value;
-}
-
-bool take(std::string_view& text, char c) {
-  if (!text.starts_with(c)) return false;
-  text.remove_prefix(1);
-  return true;
-}
-
-// "16:45"
-std::optional<minutes> take_clock(std::string_view& text) {
-  const auto hour = take_digits(text, 2);
-  if (!hour || *hour > 23 || !take(text, ':')) return std::nullopt;
-  const auto minute = take_digits(text, 2);
-  if (!minute || *minute > 59) return std::nullopt;
-  return hours(*hour) + minutes(*minute);
-}
-
-// ":00.25", or an empty text.
-std::optional<microseconds> take_second(std::string_view& text) {
-  if (!take(text, ':')) return microseconds(0);
-  const auto second = take_digits(text, 2);
-  if (!second || *second > 60) return std::nullopt;
-  microseconds sum = seconds(*second);
-  if (!take(text, '.')) return sum;
-  std::int64_t unit = 1'000'000;
-  bool any = false;
-  for (; !text.empty() && text[0] >= '0' && text[0] <= '9'; text.remove_prefix(1), any = true) {
-    unit /= 10;
-    sum += microseconds(unit * (text[0] - '0'));
-  }
-  return any ? std::optional(sum) : std::nullopt;
-}
-
-std::optional<minutes> take_zone(std::string_view& text) {
-  if (take(text, 'Z')) return minutes(0);
-  const bool east = text.starts_with('+');
-  if (!take(text, '+') && !take(text, '-')) return std::nullopt;
-  const auto offset = take_clock(text);
-  return offset ? std::optional(east ? *offset : -*offset) : std::nullopt;
-}
-
-}  // namespace
 
 std::string utc_text(std::int64_t utime_us) {
   const microseconds at(utime_us);
@@ -77,22 +26,20 @@ std::string format_utc(std::int64_t utime_us, std::string_view letters) {
 }
 
 std::optional<std::int64_t> parse_utc(std::string_view text) {
-  const auto y = take_digits(text, 4);
-  if (!y || !take(text, '-')) return std::nullopt;
-  const auto m = take_digits(text, 2);
-  if (!m || !take(text, '-')) return std::nullopt;
-  const auto d = take_digits(text, 2);
-  if (!d) return std::nullopt;
-  const year_month_day date{year(*y), month(static_cast<unsigned>(*m)), day(static_cast<unsigned>(*d))};
-  if (!date.ok()) return std::nullopt;
-  const microseconds midnight = sys_days(date).time_since_epoch();
-  if (text.empty()) return midnight.count();
-  if (!take(text, 'T')) return std::nullopt;
-  const auto clock = take_clock(text);
-  const auto second = clock ? take_second(text) : std::nullopt;
-  const auto zone = second ? take_zone(text) : std::nullopt;
-  if (!zone || !text.empty()) return std::nullopt;
-  return (midnight + *clock + *second - *zone).count();
+  static const auto form = boost::xpressive::cregex::compile(
+      R"((\d{4})-(\d\d)-(\d\d)(?:T(\d\d):(\d\d)(?::(\d\d)(?:\.(\d+))?)?(?:Z|([-+])(\d\d):(\d\d)))?)");
+  boost::xpressive::cmatch part;
+  if (!regex_match(text.data(), text.data() + text.size(), part, form)) return std::nullopt;
+  const auto number = [&](std::size_t i) { return part[i].matched ? std::stoi(part[i]) : 0; };
+  const year_month_day date{year(number(1)), month(number(2)), day(number(3))};
+  if (!date.ok() || number(4) > 23 || number(5) > 59 || number(6) > 60 || number(9) > 23 || number(10) > 59)
+    return std::nullopt;
+  std::string decimals = part[7];
+  decimals.resize(6, '0');
+  const minutes offset = hours(number(9)) + minutes(number(10));
+  const seconds local =
+      sys_days(date).time_since_epoch() + hours(number(4)) + minutes(number(5)) + seconds(number(6));
+  return (local + microseconds(std::stoi(decimals)) - (part[8] == "-" ? -offset : offset)).count();
 }
 
 }  // namespace joulecast
