@@ -1,6 +1,7 @@
 #include "robot/robot_fields.h"
 
 #include <algorithm>
+#include <boost/xpressive/xpressive_dynamic.hpp>
 
 namespace joulecast::robot {
 namespace {
@@ -136,19 +137,9 @@ constexpr Unit units[] = {
     {"_k", "K"},
 };
 
-template <class Allowed>
-bool is_name(std::string_view text, std::size_t longest, Allowed allowed) {
-  return !text.empty() && text.size() <= longest && std::all_of(text.begin(), text.end(), allowed);
-}
-
-bool is_digit(char c) {
-  return c >= '0' && c <= '9';
-}
-bool is_lower(char c) {
-  return c >= 'a' && c <= 'z';
-}
-bool is_upper(char c) {
-  return c >= 'A' && c <= 'Z';
+bool matches(std::string_view text, std::string_view pattern) {
+  return regex_match(text.begin(), text.end(),
+                     boost::xpressive::cregex::compile(pattern.begin(), pattern.end()));
 }
 
 }  // namespace
@@ -172,13 +163,11 @@ std::span<const ObjectWords> object_words() {
 }
 
 bool is_robot_id(std::string_view text) {
-  return is_name(text, 47, [](char c) {
-    return is_digit(c) || is_lower(c) || is_upper(c) || c == '.' || c == '_' || c == '-';
-  });
+  return matches(text, robot_id_pattern);
 }
 
 bool is_effect_name(std::string_view text) {
-  return is_name(text, 64, [](char c) { return is_digit(c) || is_lower(c) || c == '_'; });
+  return matches(text, effect_name_pattern);
 }
 
 std::string_view unit_of(std::string_view name) {

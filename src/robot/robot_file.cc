@@ -59,20 +59,21 @@ std::string child(const std::string& pointer, std::string_view key) {
   return pointer + (Json::json_pointer() / std::string(key)).to_string();
 }
 
+// Whether the value is of the kind; a problem if not.
+bool is_kind(bool fits, std::string_view kind, const Json& value, const std::string& pointer,
+             Problems& problems) {
+  if (!fits) problems.add(pointer, fmt::format("is {}, must be {}", value.type_name(), kind));
+  return fits;
+}
+
 std::optional<double> number(const Json& value, const std::string& pointer, Problems& problems) {
-  if (!value.is_number()) {
-    problems.add(pointer, fmt::format("is {}, must be a number", value.type_name()));
-    return std::nullopt;
-  }
+  if (!is_kind(value.is_number(), "a number", value, pointer, problems)) return std::nullopt;
   return value.get<double>();
 }
 
 std::optional<std::vector<double>> numbers(const Json& value, const std::string& pointer,
                                            Problems& problems) {
-  if (!value.is_array()) {
-    problems.add(pointer, fmt::format("is {}, must be an array of numbers", value.type_name()));
-    return std::nullopt;
-  }
+  if (!is_kind(value.is_array(), "an array of numbers", value, pointer, problems)) return std::nullopt;
   std::vector<double> out;
   for (std::size_t i = 0; i < value.size(); ++i) {
     const auto element = number(value[i], fmt::format("{}/{}", pointer, i), problems);
@@ -85,10 +86,7 @@ std::optional<std::vector<double>> numbers(const Json& value, const std::string&
 // Reports every other key of the object; false when the value is no object.
 bool object_of(const Json& value, const std::string& pointer, const std::set<std::string_view>& known,
                Problems& problems) {
-  if (!value.is_object()) {
-    problems.add(pointer, fmt::format("is {}, must be an object", value.type_name()));
-    return false;
-  }
+  if (!is_kind(value.is_object(), "an object", value, pointer, problems)) return false;
   for (const auto& [key, unused] : value.items())
     if (!known.contains(key)) problems.add(child(pointer, key), "is an unknown key");
   return true;
@@ -97,10 +95,7 @@ bool object_of(const Json& value, const std::string& pointer, const std::set<std
 // ---- reading: shapes into the model ----
 
 void read(const Json& value, const std::string& pointer, std::string& out, Problems& problems) {
-  if (value.is_string())
-    out = value.get<std::string>();
-  else
-    problems.add(pointer, fmt::format("is {}, must be a string", value.type_name()));
+  if (is_kind(value.is_string(), "a string", value, pointer, problems)) out = value.get<std::string>();
 }
 
 void read(const Json& value, const std::string& pointer, double& out, Problems& problems) {
@@ -145,10 +140,7 @@ void read_curve(const Json& value, const std::string& pointer, std::string_view 
 
 template <class Element>
 void read(const Json& value, const std::string& pointer, std::vector<Element>& out, Problems& problems) {
-  if (!value.is_array()) {
-    problems.add(pointer, fmt::format("is {}, must be an array of objects", value.type_name()));
-    return;
-  }
+  if (!is_kind(value.is_array(), "an array of objects", value, pointer, problems)) return;
   std::set<std::string_view> known;
   for (const auto& field : element_fields<Element>()) known.insert(field.key);
   for (std::size_t i = 0; i < value.size(); ++i) {
@@ -169,18 +161,12 @@ void read(const Json& value, const std::string& pointer, std::vector<Element>& o
 
 void read(const Json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
           Problems& problems) {
-  if (!value.is_object()) {
-    problems.add(pointer, fmt::format("is {}, must be an object", value.type_name()));
-    return;
-  }
+  if (!is_kind(value.is_object(), "an object", value, pointer, problems)) return;
   for (const auto& [id, parameters] : value.items()) {
     const std::string effect_pointer = child(pointer, id);
     AdoptedEffect& effect = out.emplace_back();
     effect.id = id;
-    if (!parameters.is_object()) {
-      problems.add(effect_pointer, fmt::format("is {}, must be an object", parameters.type_name()));
-      continue;
-    }
+    if (!is_kind(parameters.is_object(), "an object", parameters, effect_pointer, problems)) continue;
     for (const auto& [name, parameter] : parameters.items()) {
       const std::string name_pointer = child(effect_pointer, name);
       if (const auto read_value = number(parameter, name_pointer, problems))
