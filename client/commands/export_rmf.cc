@@ -30,20 +30,16 @@ struct RmfOptions {
 };
 
 // What is written without --config. The charging current stays unknown if the robot was never seen charging.
-constexpr const char* empty_configuration =
-    "rmf_fleet:\n"
-    "  battery_system:\n"
-    "    voltage: 0 # V\n"
-    "    capacity: 0 # Ah\n"
-    "    charging_current: 0 # A\n"
-    "  mechanical_system:\n"
-    "    mass: 0 # kg\n"
-    "    moment_of_inertia: 0 # kg m^2\n"
-    "    friction_coefficient: 0\n"
-    "  ambient_system:\n"
-    "    power: 0 # W\n"
-    "  tool_system:\n"
-    "    power: 0 # W\n";
+std::string empty_configuration() {
+  std::string text = "rmf_fleet:\n", section;
+  for (const RmfPlace& place : rmf_places()) {
+    if (section != place.section) text += fmt::format("  {}:\n", place.section);
+    section = place.section;
+    const std::string unit = *place.unit == '\0' ? "" : std::string(" # ") + place.unit;
+    text += fmt::format("    {}: 0{}\n", place.key, unit);
+  }
+  return text;
+}
 
 Result<Json> object_at(const RmfOptions& options, const std::string& target) {
   return ask_object(options.server, target, {{"id", "robot"}});
@@ -144,23 +140,17 @@ Json rmf_json(const RmfError& error) {
 }
 
 Json rmf_json(const RmfOptions& options, const RmfFit& fit) {
-  const RmfParameters& p = fit.parameters;
-  return {{"robot_id", options.robot_id},
-          {"missions", {{"fitted", fit.fitted}, {"held_out", fit.held_out}}},
-          {"error", rmf_json(fit.error)},
-          {"error_before", fit.error_before ? rmf_json(*fit.error_before) : Json()},
-          {"error_with_turns", rmf_json(fit.error_with_turns)},
-          {"turn_j_per_rad", fit.turn_j_per_rad},
-          {"battery_system",
-           {{"voltage", p.voltage},
-            {"capacity", p.capacity},
-            {"charging_current", p.charging_current ? Json(*p.charging_current) : Json()}}},
-          {"mechanical_system",
-           {{"mass", p.mass},
-            {"moment_of_inertia", p.moment_of_inertia},
-            {"friction_coefficient", p.friction_coefficient}}},
-          {"ambient_system", {{"power", p.ambient_power}}},
-          {"tool_system", {{"power", p.tool_power}}}};
+  Json document{{"robot_id", options.robot_id},
+                {"missions", {{"fitted", fit.fitted}, {"held_out", fit.held_out}}},
+                {"error", rmf_json(fit.error)},
+                {"error_before", fit.error_before ? rmf_json(*fit.error_before) : Json()},
+                {"error_with_turns", rmf_json(fit.error_with_turns)},
+                {"turn_j_per_rad", fit.turn_j_per_rad}};
+  for (const RmfPlace& place : rmf_places()) {
+    const std::optional<double> value = place.get(fit.parameters);
+    document[place.section][place.key] = value ? Json(*value) : Json();
+  }
+  return document;
 }
 
 std::string configuration_of(const RmfOptions& options, std::string yaml, const RmfFit& fit) {
@@ -172,7 +162,7 @@ std::string configuration_of(const RmfOptions& options, std::string yaml, const 
 }
 
 Result<Exit> export_rmf(RmfOptions& options) {
-  std::string yaml = empty_configuration;
+  std::string yaml = empty_configuration();
   std::optional<RmfParameters> before;
   if (!options.config.empty()) {
     TRY_ASSIGN(yaml, read_file(options.config));

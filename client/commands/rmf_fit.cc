@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 #include <sstream>
 #include <string_view>
 #include <utility>
@@ -96,31 +95,10 @@ RmfError error_by(std::span<const std::vector<RmfDrive>> missions,
   return error;
 }
 
-struct RmfPlace {
-  const char* section;
-  const char* key;
-  std::function<std::optional<double>(const RmfParameters&)> get;
-  std::function<void(RmfParameters&, double)> set;
-};
-
 template <class Member>
-RmfPlace rmf_place(const char* section, const char* key, Member member) {
-  return {section, key, [member](const RmfParameters& p) { return std::optional<double>(p.*member); },
+RmfPlace rmf_place(const char* section, const char* key, const char* unit, Member member) {
+  return {section, key, unit, [member](const RmfParameters& p) { return std::optional<double>(p.*member); },
           [member](RmfParameters& p, double value) { p.*member = value; }};
-}
-
-// In the order of the configurations of RMF's demonstrations.
-const std::vector<RmfPlace>& rmf_places() {
-  static const std::vector<RmfPlace> table{
-      rmf_place("battery_system", "voltage", &RmfParameters::voltage),
-      rmf_place("battery_system", "capacity", &RmfParameters::capacity),
-      rmf_place("battery_system", "charging_current", &RmfParameters::charging_current),
-      rmf_place("mechanical_system", "mass", &RmfParameters::mass),
-      rmf_place("mechanical_system", "moment_of_inertia", &RmfParameters::moment_of_inertia),
-      rmf_place("mechanical_system", "friction_coefficient", &RmfParameters::friction_coefficient),
-      rmf_place("ambient_system", "power", &RmfParameters::ambient_power),
-      rmf_place("tool_system", "power", &RmfParameters::tool_power)};
-  return table;
 }
 
 // "  mass: 55.0  # kg": the key, and the place of the value in the line; without a value for
@@ -162,6 +140,20 @@ std::string with_values(const std::string& yaml,
 }
 
 }  // namespace
+
+const std::vector<RmfPlace>& rmf_places() {
+  using P = RmfParameters;
+  static const std::vector<RmfPlace> table{
+      rmf_place("battery_system", "voltage", "V", &P::voltage),
+      rmf_place("battery_system", "capacity", "Ah", &P::capacity),
+      rmf_place("battery_system", "charging_current", "A", &P::charging_current),
+      rmf_place("mechanical_system", "mass", "kg", &P::mass),
+      rmf_place("mechanical_system", "moment_of_inertia", "kg m^2", &P::moment_of_inertia),
+      rmf_place("mechanical_system", "friction_coefficient", "", &P::friction_coefficient),
+      rmf_place("ambient_system", "power", "W", &P::ambient_power),
+      rmf_place("tool_system", "power", "W", &P::tool_power)};
+  return table;
+}
 
 std::vector<RmfDrive> rmf_drives(const RmfTelemetry& telemetry, double wheel_radius_m, double half_track_m) {
   const Steps s = steps_of(telemetry, wheel_radius_m, half_track_m);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -58,6 +59,17 @@ struct RmfError {
 
 [[nodiscard]] RmfError rmf_error(const RmfParameters& parameters,
                                  std::span<const std::vector<RmfDrive>> missions);
+
+// Where a value stands in a configuration.
+struct RmfPlace {
+  const char* section;
+  const char* key;
+  const char* unit;
+  std::function<std::optional<double>(const RmfParameters&)> get;
+  std::function<void(RmfParameters&, double)> set;
+};
+// In the order of the configurations of RMF's demonstrations.
+[[nodiscard]] const std::vector<RmfPlace>& rmf_places();
 
 struct RmfFit {
   RmfParameters parameters;
