@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
@@ -113,24 +112,6 @@ struct DiagnosisService::Job {
   std::atomic<bool> cancelled = false;
   std::int64_t started_utime_us = 0;  // written before the job is the running one
 };
-
-DiagnosisService::DiagnosisService(const history::Store& store, history::Writer& writer,
-                                   const ingest::ModelRegistry& models, const DriftView& drift,
-                                   std::function<std::int64_t()> now_utime_us,
-                                   const DiagnosisOptions& options,
-                                   std::function<void(const Error&)> on_error, Ended on_ended)
-    : store_(store),
-      writer_(writer),
-      models_(models),
-      drift_(drift),
-      now_utime_us_(std::move(now_utime_us)),
-      options_(options),
-      on_error_(std::move(on_error)),
-      on_ended_(std::move(on_ended)) {}
-
-DiagnosisService::~DiagnosisService() {
-  stop();
-}
 
 Result<void> DiagnosisService::start() {
   TRY(writer_.execute(history::InterruptDiagnoses{now_utime_us_()}));

@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -65,8 +66,16 @@ class DiagnosisService {
   DiagnosisService(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
                    const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                    const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
-                   Ended on_ended = {});
-  ~DiagnosisService();  // cancels the running job
+                   Ended on_ended = {})
+      : store_(store),
+        writer_(writer),
+        models_(models),
+        drift_(drift),
+        now_utime_us_(std::move(now_utime_us)),
+        options_(options),
+        on_error_(std::move(on_error)),
+        on_ended_(std::move(on_ended)) {}
+  ~DiagnosisService() { stop(); }  // cancels the running job
 
   // Marks jobs that the last daemon left unfinished, then starts to work.
   Result<void> start();

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/median.h"
@@ -55,20 +54,6 @@ Json mark_json(const drift::Mark& mark) {
 }
 
 }  // namespace
-
-GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-                   const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
-                   std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
-                   std::function<void(const Error&)> on_error)
-    : store_(store),
-      writer_(writer),
-      models_(models),
-      drift_(drift),
-      forecasts_(forecasts),
-      diagnoses_(diagnoses),
-      now_utime_us_(std::move(now_utime_us)),
-      options_(options),
-      on_error_(std::move(on_error)) {}
 
 void GapWatch::start() {
   if (options_.period_s > 0) thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });

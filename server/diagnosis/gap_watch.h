@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "history/store.h"
@@ -55,7 +56,16 @@ class GapWatch {
   GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
            const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
            std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
-           std::function<void(const Error&)> on_error);
+           std::function<void(const Error&)> on_error)
+      : store_(store),
+        writer_(writer),
+        models_(models),
+        drift_(drift),
+        forecasts_(forecasts),
+        diagnoses_(diagnoses),
+        now_utime_us_(std::move(now_utime_us)),
+        options_(options),
+        on_error_(std::move(on_error)) {}
 
   void start();
   void stop() { thread_ = {}; }

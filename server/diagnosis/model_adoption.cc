@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "answers/mission.h"
 #include "base/try.h"
@@ -55,16 +54,6 @@ Error as_of_request(Error error, const gap::Offer& offer) {
 }
 
 }  // namespace
-
-ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& writer,
-                             ingest::ModelRegistry& models, const DriftView& drift,
-                             std::function<std::int64_t()> now_utime_us, const AdoptionOptions& options)
-    : store_(store),
-      writer_(writer),
-      models_(models),
-      drift_(drift),
-      now_utime_us_(std::move(now_utime_us)),
-      options_(options) {}
 
 Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
                                                 const ingest::ModelInForce& before,

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -79,7 +80,13 @@ class ModelAdoption {
  public:
   ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
                 const DriftView& drift, std::function<std::int64_t()> now_utime_us,
-                const AdoptionOptions& options);
+                const AdoptionOptions& options)
+      : store_(store),
+        writer_(writer),
+        models_(models),
+        drift_(drift),
+        now_utime_us_(std::move(now_utime_us)),
+        options_(options) {}
 
   // Fault::not_found: the robot has no model to test against; ::invalid: the candidate is no valid model;
   // ::conflict: another model came in force meanwhile; ::unavailable: another back-test is running, or the

@@ -1,7 +1,6 @@
 #include "server/diagnosis/proposal_review.h"
 
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
@@ -40,16 +39,6 @@ Json detail_of(const history::Proposal& proposal) {
 }
 
 }  // namespace
-
-ProposalReview::ProposalReview(const history::Store& store, history::Writer& writer, ModelAdoption& adoption,
-                               const DriftView& drift, std::function<std::int64_t()> now_utime_us,
-                               ReviewOptions options)
-    : store_(store),
-      writer_(writer),
-      adoption_(adoption),
-      drift_(drift),
-      now_utime_us_(std::move(now_utime_us)),
-      options_(std::move(options)) {}
 
 void ProposalReview::suggest(history::Proposal candidate) {
   {

@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "history/store.h"
 #include "history/writer.h"
@@ -28,7 +29,13 @@ struct ReviewOptions {
 class ProposalReview {
  public:
   ProposalReview(const history::Store& store, history::Writer& writer, ModelAdoption& adoption,
-                 const DriftView& drift, std::function<std::int64_t()> now_utime_us, ReviewOptions options);
+                 const DriftView& drift, std::function<std::int64_t()> now_utime_us, ReviewOptions options)
+      : store_(store),
+        writer_(writer),
+        adoption_(adoption),
+        drift_(drift),
+        now_utime_us_(std::move(now_utime_us)),
+        options_(std::move(options)) {}
 
   // To be called by sessions; do not wait.
   void suggest(history::Proposal candidate);
