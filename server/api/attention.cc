@@ -6,14 +6,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/sleep.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "describe/input.h"
-#include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -24,11 +22,6 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Acknowledgement, utime_us, by, note)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(AttentionReason, kind, subject, severity, message, action)
 
 namespace {
-
-using described::Table;
-using http::Method;
-using http::Request;
-using http::Response;
 
 constexpr const char* topic = "attention";
 constexpr std::size_t most_note = 1024;  // bytes
@@ -332,10 +325,6 @@ std::vector<std::string_view> attention_kinds() {
   return names;
 }
 
-AttentionList::AttentionList(const Services& services, std::function<bool(const std::string&)> is_own,
-                             std::function<void(const Error&)> on_error)
-    : services_(services), is_own_(std::move(is_own)), on_error_(std::move(on_error)) {}
-
 void AttentionList::start() {
   thread_ = std::jthread([this](const std::stop_token& stop) {
     do {
@@ -502,13 +491,13 @@ void AttentionList::look() {
 
 Part attention_part() {
   Rows rows;
-  rows.add(Method::get, "/v1/attention", "listAttention", http::Role::read,
+  rows.add(Method::get, "/v1/attention", "listAttention", Role::read,
            "Robots that need attention now, the most urgent first, each with its reasons and what to do",
            "attention", get_attention);
-  rows.add(Method::post, "/v1/robots/{id}/acknowledge", "acknowledgeAttention", http::Role::operate,
+  rows.add(Method::post, "/v1/robots/{id}/acknowledge", "acknowledgeAttention", Role::operate,
            "Acknowledges a robot's reasons of one kind, with a note, until their condition ends",
            "attention-entry", acknowledge,
-           {.request_schema = "acknowledge-request", .error_statuses = {404, 422}, .run = http::Run::write});
+           {.request_schema = "acknowledge-request", .error_statuses = {404, 422}, .run = Run::write});
   return {std::move(rows),
           {{"acknowledge-request", acknowledge_input().schema()},
            {"attention", attention_table().schema()},

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -59,7 +60,8 @@ class AttentionList {
  public:
   // `is_own`: see WatchOptions. The list outlives no member of `services`.
   AttentionList(const Services& services, std::function<bool(const std::string& robot_id)> is_own,
-                std::function<void(const Error&)> on_error);
+                std::function<void(const Error&)> on_error)
+      : services_(services), is_own_(std::move(is_own)), on_error_(std::move(on_error)) {}
 
   // Looks once a second, in a thread of its own, until stop().
   void start();

@@ -1,5 +1,4 @@
 #include "base/try.h"
-#include "describe/table.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
@@ -7,15 +6,12 @@
 namespace joulecast::api {
 namespace {
 
-using http::Request;
-using http::Response;
-
 constexpr std::string_view usual_request_order = "desc";
 
-const described::Table<history::AuditEntry>& entry_table() {
+const Table<history::AuditEntry>& entry_table() {
   using E = history::AuditEntry;
   static const auto table =
-      described::Table<E>()
+      Table<E>()
           .value("id", &E::id, "1, 2, 3 ..., without a gap")
           .time("", &E::utime_us, "time of storage, microseconds since 1970 by the host's clock")
           .text_or_null("actor", &E::actor, "name of the token; null: no authenticated client")
@@ -40,7 +36,7 @@ Result<Response> audit(const Services& services, const Request& request) {
 
 Part audit_part() {
   Rows rows;
-  rows.add(http::Method::get, "/v1/audit", "listAudit", http::Role::admin,
+  rows.add(Method::get, "/v1/audit", "listAudit", Role::admin,
            "Changes, rejected requests and sign-ins with their tokens; joulecast audit verify checks the "
            "chain of hashes",
            "audit", audit,

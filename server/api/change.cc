@@ -13,9 +13,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Request;
-using http::Response;
-
 bool is_valid(std::string_view key) {
   const auto visible = [](char c) { return c > 0x20 && c < 0x7f; };
   return key.size() <= http::longest_idempotency_key && std::ranges::all_of(key, visible);
@@ -43,7 +40,7 @@ Response repeated(history::RequestAnswer&& answer) {
 }  // namespace
 
 history::Change RequestChange::answered_by(Answer answer) {
-  response_ = std::make_shared<std::optional<http::Response>>();
+  response_ = std::make_shared<std::optional<Response>>();
   const std::int64_t now = services_.now_utime_us();
   const http::Kept& kept = request_.kept;
   history::Change change;
@@ -66,7 +63,14 @@ history::Change RequestChange::answered_by(Answer answer) {
   return change;
 }
 
-Result<http::Response> RequestChange::finish(Result<void> committed) {
+Result<Response> RequestChange::execute(history::Command command, std::string text) {
+  history::Change change =
+      answered_by([text = std::move(text)](std::int64_t) { return http::json_response(text); });
+  change.command = std::move(command);
+  return result(services_.writer.execute(std::move(change)));
+}
+
+Result<Response> RequestChange::finish(Result<void> committed) {
   if (!committed) {
     Error& why = committed.error();
     if (why.field == history::Change::key_field) why.field = http::idempotency_header;

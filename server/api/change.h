@@ -20,31 +20,33 @@ class RequestChange {
  public:
   // From the outcome of the change. Called on the writer's thread: it refers to nothing that ends before the
   // services.
-  using Answer = std::function<http::Response(std::int64_t outcome)>;
+  using Answer = std::function<Response(std::int64_t outcome)>;
 
-  RequestChange(const Services& services, const http::Request& request)
-      : services_(services), request_(request) {}
+  RequestChange(const Services& services, const Request& request) : services_(services), request_(request) {}
 
   // The transaction's records of the request, to which a command is added.
   history::Change answered_by(Answer answer);
 
+  // Executes the command in a transaction that is answered with the JSON text.
+  Result<Response> execute(history::Command command, std::string text);
+
   // The answer, once the transaction is committed, or why it is not.
   template <class T>
-  Result<http::Response> result(const Result<T>& committed) {
+  Result<Response> result(const Result<T>& committed) {
     return committed ? finish({}) : finish(tl::unexpected(committed.error()));
   }
 
  private:
-  Result<http::Response> finish(Result<void> committed);
+  Result<Response> finish(Result<void> committed);
 
   const Services& services_;
-  const http::Request& request_;
-  std::shared_ptr<std::optional<http::Response>> response_;  // made within the transaction
+  const Request& request_;
+  std::shared_ptr<std::optional<Response>> response_;  // made within the transaction
 };
 
 // The key of a request, and the answer under it; without a time.
-history::RequestAnswer key_of(const http::Request& request);
-history::RequestAnswer answer_under(history::RequestAnswer key, const http::Response& response);
+history::RequestAnswer key_of(const Request& request);
+history::RequestAnswer answer_under(history::RequestAnswer key, const Response& response);
 
 // Answers a repeated request as it was answered the first time, and does nothing.
 class IdempotencyKeys {
@@ -67,9 +69,9 @@ class IdempotencyKeys {
   http::Endpoint honoured(http::Endpoint endpoint) const;
 
  private:
-  Result<http::Response> answer(const http::Request& request, const http::Handler& handler) const;
+  Result<Response> answer(const Request& request, const http::Handler& handler) const;
   // The answer under the request's key, or a refusal if that was another request; absent: none.
-  Result<std::optional<http::Response>> known(const http::Request& request) const;
+  Result<std::optional<Response>> known(const Request& request) const;
 
   const Options options_;
 };

@@ -1,18 +1,10 @@
 #include <algorithm>
 
-#include "describe/table.h"
 #include "server/api/services.h"
 
 // The cluster that this daemon is a member of, as it last read it from the database.
 namespace joulecast::api {
 namespace {
-
-using http::Method;
-using http::Request;
-using http::Response;
-
-using described::Schema;
-using described::Table;
 
 // A daemon of the cluster, with the robots that it keeps and receives.
 struct Node : history::Member {
@@ -122,7 +114,7 @@ Result<Response> cluster(const Services& services, const Request&) {
 
 Part cluster_part() {
   Rows rows;
-  rows.add(Method::get, "/v1/cluster", "getCluster", http::Role::read,
+  rows.add(Method::get, "/v1/cluster", "getCluster", Role::read,
            "The daemons that share the fleet, and which of them keeps which robot; name is null where "
            "cluster.name is not set",
            "cluster", cluster);

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/try.h"
-#include "describe/table.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
@@ -14,11 +13,6 @@ namespace {
 using answers::FloorCell;
 using answers::FloorMap;
 using answers::FloorZone;
-using described::Table;
-using http::Method;
-using http::Parameter;
-using http::Request;
-using http::Response;
 
 constexpr std::int64_t most_cells = 20'000;   // largest accepted limit
 constexpr std::int64_t usual_cells = 10'000;  // default limit
@@ -57,7 +51,7 @@ std::vector<Square> squares_of(const FloorAnswer& answer) {
   return squares;
 }
 
-const described::Schema at_least_0{{"minimum", 0}};
+const Schema at_least_0{{"minimum", 0}};
 
 const Table<Square>& square_table() {
   using S = Square;
@@ -170,7 +164,7 @@ Result<Response> floor_map(const Services& services, const Request& request) {
 
 Part floor_map_part() {
   Rows rows;
-  rows.add(Method::get, "/v1/floor-map", "mapFloor", http::Role::read,
+  rows.add(Method::get, "/v1/floor-map", "mapFloor", Role::read,
            "Energy and gap by floor square, from the traces of missions, with zones of significant "
            "departure; of a history of more than a million seconds an evenly distributed sample of the "
            "missions is evaluated",

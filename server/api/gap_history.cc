@@ -13,15 +13,10 @@
 namespace joulecast::api {
 namespace {
 
-using http::Method;
-using http::Request;
-using http::Response;
 using Json = nlohmann::json;
 
 constexpr std::int64_t max_gap_missions = 5000;
 constexpr std::string_view usual_event_order = "asc";
-
-using described::Table;
 
 struct GapHistory {
   std::string robot_id;
@@ -136,10 +131,10 @@ Response event_csv(const Request& request, const std::vector<history::Event>& ev
   return csv.response("event-log", request, next_cursor);
 }
 
-const described::Table<history::Event>& event_table() {
+const Table<history::Event>& event_table() {
   using E = history::Event;
   static const auto table =
-      described::Table<E>()
+      Table<E>()
           .value("id", &E::id, "number of the entry, ascending")
           .time("", &E::utime_us, "time of the event, microseconds since 1970 by the host's clock")
           .text_or_null("robot_id", &E::robot_id, "robot of the event; null: none")
@@ -162,7 +157,7 @@ Result<Response> list_events(const Services& services, const Request& request) {
 
 Part gap_history_part() {
   Rows rows;
-  rows.add(Method::get, "/v1/robots/{id}/gap-history", "getGapHistory", http::Role::read,
+  rows.add(Method::get, "/v1/robots/{id}/gap-history", "getGapHistory", Role::read,
            "Measured over modelled energy of a robot's missions with marks where it drifted, the models "
            "adopted, and the robots of its kind",
            "gap-history", gap_history,
@@ -176,7 +171,7 @@ Part gap_history_part() {
 Part event_log_part() {
   Rows rows;
   rows.add(
-      Method::get, "/v1/event-log", "listEventLog", http::Role::read,
+      Method::get, "/v1/event-log", "listEventLog", Role::read,
       "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
       "event-log", list_events,
       {.former_path = "/v1/audit-log",

@@ -7,7 +7,6 @@
 
 #include "base/json_fields.h"
 #include "base/try.h"
-#include "describe/table.h"
 #include "robot/robot_fields.h"
 #include "server/api/change.h"
 #include "server/api/services.h"
@@ -16,11 +15,7 @@
 namespace joulecast::api {
 namespace {
 
-using described::Table;
 using history::FloorPlan;
-using http::Method;
-using http::Request;
-using http::Response;
 
 constexpr const char* place_topic = "place";  // of the robot's settings in the store
 // Of a map or level, as a covariate can name it.
@@ -134,12 +129,10 @@ Result<Response> put_place(Services& services, const Request& request) {
     if (fields.ok() && !name->empty() && !robot::is_robot_id(*name)) fields.fault(key, name_rule);
   }
   TRY(fields.finish());
-  RequestChange request_change(services, request);
-  history::Change change = request_change.answered_by(
-      [text = place_table().text(place)](std::int64_t) { return http::json_response(text); });
   const nlohmann::json body{{"map", place.map}, {"level", place.level}};
-  change.command = history::PutLearned{{id, place_topic, services.now_utime_us(), body.dump()}};
-  return request_change.result(services.writer.execute(std::move(change)));
+  return RequestChange(services, request)
+      .execute(history::PutLearned{{id, place_topic, services.now_utime_us(), body.dump()}},
+               place_table().text(place));
 }
 
 Result<FloorPlan> named(const Request& request) {
@@ -180,23 +173,15 @@ Result<Response> put_plan(Services& services, const Request& request) {
   plan.media_type = request.header("content-type");
   if (!is_of_type(request.body, plan.media_type))
     return invalid("Content-Type", "must be image/png or image/svg+xml, and the body such an image");
-  RequestChange request_change(services, request);
-  history::Change change = request_change.answered_by(
-      [text = plan_table().text(plan)](std::int64_t) { return http::json_response(text); });
+  std::string text = plan_table().text(plan);
   plan.image = request.body;
-  change.command = history::PutFloorPlan{std::move(plan)};
-  return request_change.result(services.writer.execute(std::move(change)));
+  return RequestChange(services, request).execute(history::PutFloorPlan{std::move(plan)}, std::move(text));
 }
 
 Result<Response> remove_plan(Services& services, const Request& request) {
   TRY_ASSIGN(FloorPlan plan, named(request));
-  RequestChange request_change(services, request);
-  history::Change change =
-      request_change.answered_by([text = place_table().text({plan.map, plan.level})](std::int64_t) {
-        return http::json_response(text);
-      });
-  change.command = history::PutFloorPlan{std::move(plan)};
-  return request_change.result(services.writer.execute(std::move(change)));
+  std::string text = place_table().text({plan.map, plan.level});
+  return RequestChange(services, request).execute(history::PutFloorPlan{std::move(plan)}, std::move(text));
 }
 
 Result<Response> get_plan(const Services& services, const Request& request) {
@@ -214,24 +199,24 @@ Result<Response> get_plan(const Services& services, const Request& request) {
 Part map_part() {
   constexpr const char* path = "/v1/maps/{map}/levels/{level}";
   const auto number = [](std::string name, std::string words, double bound) {
-    return http::Parameter{.name = std::move(name),
-                           .type = http::Parameter::Type::number,
-                           .description = std::move(words),
-                           .minimum = -bound,
-                           .maximum = bound};
+    return Parameter{.name = std::move(name),
+                     .type = Parameter::Type::number,
+                     .description = std::move(words),
+                     .minimum = -bound,
+                     .maximum = bound};
   };
   Rows rows;
-  rows.add(Method::get, "/v1/maps", "listMaps", http::Role::read,
+  rows.add(Method::get, "/v1/maps", "listMaps", Role::read,
            "Floor plans, and the map and level on which each robot drives", "maps", list_maps);
-  rows.add(Method::get, path, "getFloorPlan", http::Role::read, "The image of a floor plan", "", get_plan,
+  rows.add(Method::get, path, "getFloorPlan", Role::read, "The image of a floor plan", "", get_plan,
            {.response_type = "image/*", .etag = true, .error_statuses = {404}});
   rows.add(
-      Method::put, path, "putFloorPlan", http::Role::admin,
+      Method::put, path, "putFloorPlan", Role::admin,
       "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its scale and origin as in "
       "a map.yaml of ROS",
       "floor-plan", put_plan,
       {.parameters = {{.name = "resolution_m",
-                       .type = http::Parameter::Type::number,
+                       .type = Parameter::Type::number,
                        .description = "side of a pixel of the image, m",
                        .minimum = 1e-4,
                        .maximum = 100,
@@ -243,14 +228,14 @@ Part map_part() {
        .request_types = {"image/png", "image/svg+xml"},
        .max_body_bytes = most_plan_bytes,
        .error_statuses = {413, 422},
-       .run = http::Run::write});
-  rows.add(Method::del, path, "removeFloorPlan", http::Role::admin, "Deletes the floor plan of a level",
-           "robot-place", remove_plan, {.error_statuses = {404, 422}, .run = http::Run::write});
+       .run = Run::write});
+  rows.add(Method::del, path, "removeFloorPlan", Role::admin, "Deletes the floor plan of a level",
+           "robot-place", remove_plan, {.error_statuses = {404, 422}, .run = Run::write});
   rows.add(
-      Method::put, "/v1/robots/{id}/place", "putRobotPlace", http::Role::operate,
+      Method::put, "/v1/robots/{id}/place", "putRobotPlace", Role::operate,
       "Sets the map and level on which a robot drives; its covariates map=NAME and level=NAME override them",
       "robot-place", put_place,
-      {.request_schema = "robot-place", .error_statuses = {404, 422}, .run = http::Run::write});
+      {.request_schema = "robot-place", .error_statuses = {404, 422}, .run = Run::write});
   return {std::move(rows),
           {{"floor-plan", plan_table().schema()},
            {"maps", maps_table().schema()},

@@ -16,10 +16,6 @@ namespace joulecast::api {
 namespace {
 
 using history::MissionOrder;
-using http::Method;
-using http::Parameter;
-using http::Request;
-using http::Response;
 using Type = Parameter::Type;
 
 constexpr std::array<std::pair<std::string_view, MissionOrder>, 12> orders{{
@@ -194,8 +190,6 @@ Result<std::vector<Group>> groups_of(const Services& services, const Request& re
   return groups;
 }
 
-using described::Table;
-
 const Table<history::Totals>& totals_table() {
   using T = history::Totals;
   static const auto table =
@@ -275,7 +269,7 @@ Result<Response> tariff(const Services& services, const Request&) {
 Part mission_list_part() {
   Rows rows;
   rows.add(
-      Method::get, "/v1/missions", "listMissions", http::Role::read,
+      Method::get, "/v1/missions", "listMissions", Role::read,
       "Missions, newest first or sorted, in pages that stay stable while missions come", "mission-page",
       list_missions,
       {.parameters = with(with(filter_parameters(), sort_parameters()),
@@ -283,7 +277,7 @@ Part mission_list_part() {
        .csv = true,
        .rounded = true});
   rows.add(
-      Method::get, "/v1/mission-totals", "totalMissions", http::Role::read,
+      Method::get, "/v1/mission-totals", "totalMissions", Role::read,
       "Sums of energy and ledger over the selected missions, optionally by group", "mission-totals", totals,
       {.parameters = with(
            filter_parameters(),
@@ -299,7 +293,7 @@ Part mission_list_part() {
              .maximum = 1440}}),
        .csv = true,
        .rounded = true});
-  rows.add(Method::get, "/v1/tariff", "getTariff", http::Role::read,
+  rows.add(Method::get, "/v1/tariff", "getTariff", Role::read,
            "Price and emissions of a kilowatt hour, by which the page values energy", "tariff", tariff);
   return {std::move(rows),
           {{"tariff", tariff_table().schema()}, {"mission-totals", totals_answer_table().schema()}}};

@@ -7,7 +7,6 @@
 
 #include "base/try.h"
 #include "describe/input.h"
-#include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/services.h"
 #include "signals/ids.h"
@@ -16,8 +15,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Request;
-using http::Response;
 using ingest::MissionRequest;
 using signals::MissionEvent;
 using signals::MissionPhase;
@@ -93,10 +90,10 @@ struct Requested {
   const MissionEvent& event;
 };
 
-const described::Table<Requested>& requested_table() {
+const Table<Requested>& requested_table() {
   using R = Requested;
   static const auto table =
-      described::Table<R>("An accepted request to begin or end a mission")
+      Table<R>("An accepted request to begin or end a mission")
           .value("robot_id", &R::robot_id, "id of the robot")
           .word(
               "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
@@ -145,14 +142,14 @@ Result<Response> request_mission(Services& services, const Request& request) {
 
 Part mission_request_part() {
   Rows rows;
-  rows.add(http::Method::post, "/v1/robots/{id}/missions", "requestMission", http::Role::operate,
+  rows.add(Method::post, "/v1/robots/{id}/missions", "requestMission", Role::operate,
            "Begins or ends a mission of a robot that does not announce missions. It begins and ends at the "
            "time of the robot's clock; samples before and after belong to no announced mission",
            "mission-requested", request_mission,
            {.request_schema = "mission-request",
             .success_status = 202,
             .error_statuses = {404, 409, 422},
-            .run = http::Run::write});
+            .run = Run::write});
   return {std::move(rows),
           {{"mission-request", mission_event_input().schema()},
            {"mission-requested", requested_table().schema()}}};

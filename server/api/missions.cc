@@ -18,12 +18,6 @@
 namespace joulecast::api {
 namespace {
 
-using described::Table;
-using http::Method;
-using http::Parameter;
-using http::Request;
-using http::Response;
-
 constexpr std::size_t most_reason = 1024;  // bytes
 
 // The requested time of a mission.
@@ -383,7 +377,7 @@ Part mission_part() {
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}",
                    .operation_id = "getMission",
-                   .role = http::Role::read,
+                   .role = Role::read,
                    .summary = "One mission: its energy, measured and modelled",
                    .response_schema = "mission",
                    .rounded = true,
@@ -396,19 +390,19 @@ Part mission_part() {
                       return summaries->read(request);
                     };
                   }});
-  rows.add(Method::post, "/v1/missions/{id}/annul", "annulMission", http::Role::operate,
+  rows.add(Method::post, "/v1/missions/{id}/annul", "annulMission", Role::operate,
            "Excludes an ended mission from all sums and from training, with a reason that lists and the "
            "event log contain",
            "mission", annul,
            {.request_schema = "annul-request",
             .rounded = true,
             .error_statuses = {404, 409, 422},
-            .run = http::Run::write});
-  rows.add(Method::get, "/v1/missions/{id}/ledger", "getMissionLedger", http::Role::read,
+            .run = Run::write});
+  rows.add(Method::get, "/v1/missions/{id}/ledger", "getMissionLedger", Role::read,
            "Energy of a mission by term; the sum of the terms is the battery's energy", "mission-ledger",
            ledger, {.csv = true, .rounded = true, .etag = true, .error_statuses = {404}});
   rows.add(
-      Method::get, "/v1/missions/{id}/trace", "getMissionTrace", http::Role::read,
+      Method::get, "/v1/missions/{id}/trace", "getMissionTrace", Role::read,
       "Power, speed, charge and position over a mission, as minimum, mean and maximum of equal intervals",
       "mission-trace", trace,
       {.parameters = with(span, {{.name = "points",
@@ -420,13 +414,13 @@ Part mission_part() {
        .rounded = true,
        .etag = true,
        .error_statuses = {404}});
-  rows.add(Method::get, "/v1/missions/{id}/telemetry", "getMissionTelemetry", http::Role::read,
+  rows.add(Method::get, "/v1/missions/{id}/telemetry", "getMissionTelemetry", Role::read,
            "The samples of a mission as received, within the retention", "mission-telemetry", raw_telemetry,
            {.parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples),
                                       cursor_parameter()}),
             .csv = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/missions/{id}/covariates", "getMissionCovariates", http::Role::read,
+  rows.add(Method::get, "/v1/missions/{id}/covariates", "getMissionCovariates", Role::read,
            "Changes of a mission's covariates, within the retention", "mission-covariates", covariates,
            {.parameters = with(span, {limit_parameter("changes a page", history::max_telemetry_samples),
                                       cursor_parameter()}),

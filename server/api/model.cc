@@ -5,7 +5,6 @@
 
 #include "base/json_writer.h"
 #include "base/try.h"
-#include "describe/table.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
@@ -18,10 +17,6 @@
 namespace joulecast::api {
 namespace {
 
-using http::Method;
-using http::Parameter;
-using http::Request;
-using http::Response;
 using Json = nlohmann::json;
 
 Result<robot::RobotModel> candidate_of(const std::string& model_json, const std::string& robot_id,
@@ -149,10 +144,10 @@ struct AdoptionAnswer {
   std::string back_test_json = {};
 };
 
-const described::Table<AdoptionAnswer>& adoption_table() {
+const Table<AdoptionAnswer>& adoption_table() {
   using A = AdoptionAnswer;
   static const auto table =
-      described::Table<A>("Result of adopting a model")
+      Table<A>("Result of adopting a model")
           .value("robot_id", &A::robot_id, "the robot's id, as in its telemetry and its file")
           .value("adopted", &A::adopted,
                  "false: the back-test showed no improvement, or no parameter changes")
@@ -229,8 +224,7 @@ struct Difference {
   std::string changes_json;
 };
 
-const described::Table<Difference>& difference_table() {
-  using described::Schema;
+const Table<Difference>& difference_table() {
   using described::with_words;
   using D = Difference;
   static const Schema change = described::of_object(
@@ -239,7 +233,7 @@ const described::Table<Difference>& difference_table() {
        {"from", with_words(Schema::object(), "null: absent")},
        {"to", with_words(Schema::object(), "null: absent")}});
   static const auto table =
-      described::Table<D>("Differences between two versions of a robot's model")
+      Table<D>("Differences between two versions of a robot's model")
           .value("robot_id", &D::robot_id, "the robot's id, as in its telemetry and its file")
           .value("from", &D::from, "the earlier version")
           .value("to", &D::to, "the later version")
@@ -275,9 +269,8 @@ struct ProposalAnswer {
   const std::map<std::int64_t, std::string>& dismissed;
 };
 
-const described::Table<ProposalAnswer>& proposal_table() {
+const Table<ProposalAnswer>& proposal_table() {
   using described::of_type;
-  using described::Table;
   using A = ProposalAnswer;
   static const auto table =
       Table<A>()
@@ -338,7 +331,7 @@ Result<Response> all_proposals(const Services& services, const Request& request)
 Part model_part() {
   using Type = Parameter::Type;
   Rows rows;
-  rows.add(Method::post, "/v1/robots/{id}/models", "adoptModel", http::Role::operate,
+  rows.add(Method::post, "/v1/robots/{id}/models", "adoptModel", Role::operate,
            "Adopts a robot file, a diagnosis or a proposal as the next model version, after a back-test on "
            "missions that it was not fitted on; or puts an earlier version in force",
            "model-adoption", post_model,
@@ -346,8 +339,8 @@ Part model_part() {
             .request_schema = "model-request",
             .rounded = true,
             .error_statuses = {404, 409, 422},
-            .run = http::Run::write});
-  rows.add(Method::get, "/v1/robots/{id}/models/diff", "compareModels", http::Role::read,
+            .run = Run::write});
+  rows.add(Method::get, "/v1/robots/{id}/models/diff", "compareModels", Role::read,
            "Differences between two versions of a robot's model", "model-diff", diff,
            {.former_path = "/v1/robots/{id}/versions/diff",
             .parameters = {{.name = "from",
@@ -360,16 +353,16 @@ Part model_part() {
                             .minimum = 1}},
             .etag = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/robots/{id}/proposals", "listProposals", http::Role::read,
+  rows.add(Method::get, "/v1/robots/{id}/proposals", "listProposals", Role::read,
            "Model proposals for a robot, newest first", "proposal-list", proposals,
            {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
             .csv = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/proposals", "listFleetProposals", http::Role::read,
+  rows.add(Method::get, "/v1/proposals", "listFleetProposals", Role::read,
            "Model proposals for the robots of the fleet, newest first", "proposal-list", all_proposals,
            {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
             .csv = true});
-  const described::Schema robot =
+  const Schema robot =
       described::with_words(described::of_type("string", true), "null in the list of the fleet");
   return {std::move(rows),
           {{"model-adoption", adoption_table().schema()},

@@ -15,7 +15,6 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "describe/input.h"
-#include "describe/table.h"
 #include "ingest/model_loading.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -59,8 +58,7 @@ struct BatteryRow {
 
 constexpr const char* id_words = "the robot's id, as in its telemetry and its file";
 
-const described::Table<ProblemRow>& problem_table() {
-  using described::Table;
+const Table<ProblemRow>& problem_table() {
   static const auto error =
       Table<Error>()
           .word(
@@ -76,9 +74,9 @@ const described::Table<ProblemRow>& problem_table() {
   return table;
 }
 
-const described::Table<BatteryRow>& battery_table() {
+const Table<BatteryRow>& battery_table() {
   using R = BatteryRow;
-  static const auto table = described::Table<R>({}, "in another dialect")
+  static const auto table = Table<R>({}, "in another dialect")
                                 .value("robot_id", &R::robot_id, id_words)
                                 .json("battery", &R::message, "in the requested dialect",
                                       described::of_reference("battery-status"));
@@ -95,27 +93,29 @@ bool depends_on_whereabouts(const answers::AutonomyInput& input) {
   return !input.start_pose || !input.payload_kg;
 }
 
+// For errors of a request that is at that JSON pointer in the body.
+auto within(std::string at) {
+  return [at = std::move(at)](Error error) {
+    error.field.insert(0, at);
+    return error;
+  };
+}
+
 Result<std::string> answer_autonomy(const Row& row, const Common& common, const Services& services,
                                     const std::stop_token& stop) {
   TRY_ASSIGN(const auto model, model_of(services, row.robot_id));
   if (row.own && !*row.own) return tl::unexpected(row.own->error());
-  const auto in_request = [&row](Error error) {
-    error.field.insert(0, row.at);
-    return tl::unexpected(std::move(error));
-  };
   const answers::LiveRobot now = live_robot(services.fleet.find(row.robot_id).get());
   const answers::AutonomyRequest& request = row.own ? **row.own : common.request;
   std::optional<answers::TaskPlan> mine;
   if (row.own || (depends_on_whereabouts(request.input) && (now.pose || now.payload_kg))) {
-    auto plan = answers::task_plan(request.input, now);
-    if (!plan) return in_request(std::move(plan.error()));
-    mine = std::move(*plan);
+    TRY_ASSIGN(mine, answers::task_plan(request.input, now).map_error(within(row.at)));
   }
   const answers::RobotOutlook robot = services.forecasts.of(model);
-  const auto autonomy =
-      answers::autonomy(request.input, mine ? *mine : common.plan, robot, now, services.cost_tables, stop);
-  if (!autonomy) return in_request(autonomy.error());
-  std::string text = answers::autonomy_json(request, *autonomy, robot, now);
+  TRY_ASSIGN(const auto autonomy, answers::autonomy(request.input, mine ? *mine : common.plan, robot, now,
+                                                    services.cost_tables, stop)
+                                      .map_error(within(row.at)));
+  std::string text = answers::autonomy_json(request, autonomy, robot, now);
   if (request.dialect == answers::Dialect::joulecast) return text;
   return battery_table().text({row.robot_id, text});
 }
@@ -160,10 +160,10 @@ const described::Input<FleetRequest>& fleet_input() {
 }
 
 described::Schemas fleet_autonomy_schemas() {
-  const described::Schema row{{"anyOf",
-                               {described::of_reference("robot-autonomy"), battery_table().of_member(),
-                                problem_table().of_member()}}};
-  const described::Schema rows = described::with_words(
+  const Schema row{{"anyOf",
+                    {described::of_reference("robot-autonomy"), battery_table().of_member(),
+                     problem_table().of_member()}}};
+  const Schema rows = described::with_words(
       described::of_array(row),
       "one element per robot in the requested order; a robot without a forecast has a problem");
   return {{"fleet-autonomy-request", fleet_input().schema()},
@@ -174,8 +174,7 @@ described::Schemas fleet_autonomy_schemas() {
 }
 
 // {"robots": [...], "request": {...}}; one row per robot in the requested order, by default by id.
-Result<http::Response> fleet_autonomy_answer(const Json& body, Services& services,
-                                             const std::stop_token& stop) {
+Result<Response> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
   TRY_ASSIGN(auto read, fleet_input().read(body));
   std::vector<Row>& rows = read.rows;
   if (read.whole_fleet)
@@ -183,12 +182,8 @@ Result<http::Response> fleet_autonomy_answer(const Json& body, Services& service
   // An invalid common request is an error of the whole request.
   TRY_ASSIGN(auto request, answers::read_autonomy(read.shared != nullptr ? *read.shared : Json::object(),
                                                   false, "/request"));
-  auto plan = answers::task_plan(request.input, {});
-  if (!plan) {
-    plan.error().field.insert(0, "/request");
-    return tl::unexpected(std::move(plan.error()));
-  }
-  const Common common{std::move(request), std::move(*plan)};
+  TRY_ASSIGN(auto plan, answers::task_plan(request.input, {}).map_error(within("/request")));
+  const Common common{std::move(request), std::move(plan)};
 
   std::vector<std::string> texts(rows.size());
   parallel_for(rows.size(), 2, [&](std::size_t k) {
@@ -197,25 +192,16 @@ Result<http::Response> fleet_autonomy_answer(const Json& body, Services& service
     texts[k] = text ? std::move(*text) : problem_table().text({rows[k].robot_id, text.error()});
   });
   if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");
-  std::size_t length = 16;
-  for (const std::string& text : texts) length += text.size() + 1;
-  std::string out;
-  out.reserve(length);
-  out = "{\"robots\":[";
-  for (std::size_t k = 0; k < texts.size(); ++k) {
-    if (k > 0) out += ',';
-    out += texts[k];
-  }
-  out += "]}";
-  http::Response response = http::json_response(std::move(out));
+  JsonWriter out;
+  out.begin_object().key("robots").begin_array();
+  for (const std::string& text : texts) out.raw(text);
+  Response response = http::json_response(out.end_array().end_object().take());
   response.deprecated = common.request.former() || std::ranges::any_of(rows, [](const Row& row) {
                           return row.own && *row.own && (*row.own)->former();
                         });
   return response;
 }
 
-using http::Request;
-using http::Response;
 using Model = std::shared_ptr<const answers::ModelInForce>;
 
 // The version of the robot's model that the request names, or the one in force.
@@ -301,17 +287,16 @@ Result<Response> matrix(const Services& services, const Request& r) {
 }  // namespace
 
 Part planning_part() {
-  using http::Method;
   Rows rows;
   rows.push_back(
       {{.method = Method::post,
         .path = "/v1/robots/{id}/profile",
         .operation_id = "computeProfile",
-        .role = http::Role::plan,
+        .role = Role::plan,
         .summary =
             "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
         .parameters = {{.name = "model_version",
-                        .type = http::Parameter::Type::integer,
+                        .type = Parameter::Type::integer,
                         .description =
                             "the version of the robot's model to plan with; default: the one in force",
                         .minimum = 1}},
@@ -319,41 +304,41 @@ Part planning_part() {
         .response_schema = "profile",
         .rounded = true,
         .error_statuses = {404, 422},
-        .run = http::Run::compute},
+        .run = Run::compute},
        [](Services& services, http::Endpoint& endpoint) {
          answered_by(profile)(services, endpoint);
          endpoint.brief = [&services](Request& r) { return brief_profile(services, r); };
        }});
-  rows.add(Method::post, "/v1/robots/{id}/estimate", "estimateEnergy", http::Role::plan,
+  rows.add(Method::post, "/v1/robots/{id}/estimate", "estimateEnergy", Role::plan,
            "Energy of a path driven by its minimum-energy motion (the default; independent of the robot's "
            "history) or its usual driving, or of a given motion",
            "estimate", estimate,
            {.request_schema = "estimate-request",
             .rounded = true,
             .error_statuses = {404, 422},
-            .run = http::Run::compute});
+            .run = Run::compute});
   rows.add(
-      Method::post, "/v1/energy-matrix", "computeEnergyMatrix", http::Role::plan,
+      Method::post, "/v1/energy-matrix", "computeEnergyMatrix", Role::plan,
       "Energy and duration of every task with every robot, one row per robot, for minimum-energy motions "
       "(the default; equal for equal robots, independent of their history) or each robot's usual driving",
       "energy-matrix", matrix,
-      {.request_schema = "energy-matrix-request", .error_statuses = {413, 422}, .run = http::Run::compute});
-  rows.add(Method::post, "/v1/robots/{id}/autonomy", "computeAutonomy", http::Role::plan,
+      {.request_schema = "energy-matrix-request", .error_statuses = {413, 422}, .run = Run::compute});
+  rows.add(Method::post, "/v1/robots/{id}/autonomy", "computeAutonomy", Role::plan,
            "How far and how long a robot still goes, and whether it can do a list of tasks, driven as it "
            "usually drives (the default: the charge must last for that) or by minimum-energy motions",
            "autonomy", autonomy,
            {.request_schema = "autonomy-request",
             .rounded = true,
             .error_statuses = {404, 422},
-            .run = http::Run::compute});
+            .run = Run::compute});
   rows.add(
-      Method::post, "/v1/autonomy", "computeFleetAutonomy", http::Role::plan,
+      Method::post, "/v1/autonomy", "computeFleetAutonomy", Role::plan,
       "The autonomy of many robots in one call", "fleet-autonomy",
       [](Services& services, const Request& r) { return fleet_autonomy_answer(*r.json, services, r.stop); },
       {.request_schema = "fleet-autonomy-request",
        .rounded = true,
        .error_statuses = {422},
-       .run = http::Run::compute});
+       .run = Run::compute});
   return {std::move(rows), fleet_autonomy_schemas()};
 }
 

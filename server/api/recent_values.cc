@@ -5,17 +5,12 @@
 #include <vector>
 
 #include "base/try.h"
-#include "describe/table.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
 // The last 90 s of live values, with which a page fills its charts when it opens.
 namespace joulecast::api {
 namespace {
-
-using http::Method;
-using http::Request;
-using http::Response;
 
 constexpr std::int64_t max_recent_robots = 200;  // a page
 
@@ -34,12 +29,12 @@ auto each(Get get) {
   };
 }
 
-const described::Table<RecentAnswer>& recent_table() {
+const Table<RecentAnswer>& recent_table() {
   using A = RecentAnswer;
   using V = ingest::RecentValue;
   const auto pose = [](std::size_t k) { return each([k](const V& v) { return v.pose[k]; }); };
   static const auto table =
-      described::Table<A>()
+      Table<A>()
           .value("robot_id", &A::robot_id, "robot of the values")
           .integers("utime_us", each(&V::utime_us),
                     "µs since the Unix epoch by the robot's clock, ascending, about one a second; as long as "
@@ -74,7 +69,7 @@ Result<Response> recent(const Services& services, const Request& request) {
 
 Part recent_value_part() {
   Rows rows;
-  rows.add(Method::get, "/v1/recent-values", "listRecentValues", http::Role::read,
+  rows.add(Method::get, "/v1/recent-values", "listRecentValues", Role::read,
            "The last 90 s of robots' live values in columns, one a second, for charts that begin filled; "
            "kept in memory since the daemon's start",
            "recent-values", recent,
@@ -84,8 +79,7 @@ Part recent_value_part() {
                            limit_parameter("robots a page", max_recent_robots),
                            cursor_parameter()},
             .rounded = true});
-  const described::Schema window =
-      described::with_words(described::of_type("number"), "s, greatest age of the values");
+  const Schema window = described::with_words(described::of_type("number"), "s, greatest age of the values");
   return {
       std::move(rows),
       {{"recent-values", described::of_page("The last live values of robots, in columns", "robots", "by id",

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "describe/table.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
@@ -18,11 +17,6 @@
 
 namespace joulecast::api {
 namespace {
-
-using described::Table;
-using http::Method;
-using http::Request;
-using http::Response;
 
 constexpr std::int64_t max_listed_robots = 10'000;  // a page
 
@@ -306,22 +300,22 @@ Result<Response> get_version(const Services& services, const Request& request) {
 
 Part robot_part() {
   Rows rows;
-  rows.add(Method::get, "/v1/robots", "listRobots", http::Role::read,
+  rows.add(Method::get, "/v1/robots", "listRobots", Role::read,
            "The fleet: every robot that has a model or has sent telemetry, by id, with its live state",
            "robot-list", list_robots,
            {.parameters = {limit_parameter("robots a page", max_listed_robots), cursor_parameter()},
             .csv = true,
             .rounded = true});
-  rows.add(Method::get, "/v1/robots/{id}", "getRobot", http::Role::read, "A robot's model in force",
-           "robot-detail", get_robot, {.etag = true, .error_statuses = {404}});
-  rows.add(Method::post, "/v1/robot-checks", "checkRobot", http::Role::plan,
+  rows.add(Method::get, "/v1/robots/{id}", "getRobot", Role::read, "A robot's model in force", "robot-detail",
+           get_robot, {.etag = true, .error_statuses = {404}});
+  rows.add(Method::post, "/v1/robot-checks", "checkRobot", Role::plan,
            "Reviews a robot file without storing it, as joulecast check does", "robot-check", check_file,
            {.request_schema = "robot"});
-  rows.add(Method::put, "/v1/robots/{id}", "putRobot", http::Role::admin,
+  rows.add(Method::put, "/v1/robots/{id}", "putRobot", Role::admin,
            "Stores a robot's model; a changed model becomes a new version and takes effect immediately",
            "robot-version", put,
-           {.request_schema = "robot", .error_statuses = {409, 422}, .run = http::Run::write});
-  rows.add(Method::del, "/v1/robots/{id}", "removeRobot", http::Role::admin,
+           {.request_schema = "robot", .error_statuses = {409, 422}, .run = Run::write});
+  rows.add(Method::del, "/v1/robots/{id}", "removeRobot", Role::admin,
            "Removes a robot's model and ends its mission; with history=purge also deletes all its stored "
            "data except the event log",
            "robot-removal", remove,
@@ -329,20 +323,20 @@ Part robot_part() {
                             .description = "keep or purge the robot's missions and models",
                             .choices = {"keep", "purge"}}},
             .error_statuses = {404, 409},
-            .run = http::Run::write});
-  rows.add(Method::get, "/v1/robots/{id}/state", "getRobotState", http::Role::read,
+            .run = Run::write});
+  rows.add(Method::get, "/v1/robots/{id}/state", "getRobotState", Role::read,
            "A robot's live state: power, charge, mission, health of its telemetry", "robot-state", state,
-           {.rounded = true, .error_statuses = {404}, .run = http::Run::io});
-  rows.add(Method::get, "/v1/robots/{id}/models", "listModels", http::Role::read,
+           {.rounded = true, .error_statuses = {404}, .run = Run::io});
+  rows.add(Method::get, "/v1/robots/{id}/models", "listModels", Role::read,
            "Every version of a robot's model, newest first", "model-list", versions,
            {.former_path = "/v1/robots/{id}/versions",
             .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
             .etag = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/robots/{id}/models/{version}", "getModel", http::Role::read,
+  rows.add(Method::get, "/v1/robots/{id}/models/{version}", "getModel", Role::read,
            "A version of a robot's model", "model", get_version, {.etag = true, .error_statuses = {404}});
   using described::of_page;
-  const described::Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
+  const Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
   return {std::move(rows),
           {{"model", version_table().schema()},
            {"robot-check", check_table().schema()},

@@ -67,16 +67,16 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
 }
 
 described::Schemas schemas() {
-  described::Schemas all{{"accounts", answers::accounts_table().schema()},
-                         {"back-test", server::back_test_table().schema()},
-                         {"contradiction", contradiction_table().schema()},
-                         {"contradiction-event", contradiction_event_table().schema()},
-                         {"ledger", answers::ledger_table().schema()},
-                         {"openapi", http::openapi_schema()},
-                         {"problem", http::problem_schema()},
-                         {"robot", robot::robot_schema()},
-                         {"reset-event", described::of_object("Events were lost: read the state again", {},
-                                                              described::Schema::object())}};
+  described::Schemas all{
+      {"accounts", answers::accounts_table().schema()},
+      {"back-test", server::back_test_table().schema()},
+      {"contradiction", contradiction_table().schema()},
+      {"contradiction-event", contradiction_event_table().schema()},
+      {"ledger", answers::ledger_table().schema()},
+      {"openapi", http::openapi_schema()},
+      {"problem", http::problem_schema()},
+      {"robot", robot::robot_schema()},
+      {"reset-event", described::of_object("Events were lost: read the state again", {}, Schema::object())}};
   const auto add = [&all](const described::Schemas& more) {
     all.insert(all.end(), more.begin(), more.end());
   };

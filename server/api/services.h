@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "describe/schema.h"
+#include "describe/table.h"
 #include "history/store.h"
 #include "history/writer.h"
 #include "ingest/fleet_view.h"
@@ -24,6 +24,15 @@
 #include "server/http/router.h"
 
 namespace joulecast::api {
+
+using described::Schema;
+using described::Table;
+using http::Method;
+using http::Parameter;
+using http::Request;
+using http::Response;
+using http::Role;
+using http::Run;
 
 // Price and emissions of energy from the grid; not set: NaN.
 struct Tariff {
@@ -59,13 +68,11 @@ struct TableRow {
   std::function<void(Services&, http::Endpoint&)> bind;
 };
 
-// Binds to a function of (Services&, const http::Request&).
+// Binds to a function of (Services&, const Request&).
 template <class Answer>
 std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
   return [answer](Services& services, http::Endpoint& endpoint) {
-    endpoint.handler = [&services, answer](const http::Request& request) {
-      return answer(services, request);
-    };
+    endpoint.handler = [&services, answer](const Request& request) { return answer(services, request); };
   };
 }
 
@@ -73,8 +80,8 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
 // members of its row.
 struct Rows : std::vector<TableRow> {
   template <class Answer>
-  void add(http::Method method, std::string path, std::string operation_id, http::Role role,
-           std::string summary, std::string response_schema, Answer answer, http::Endpoint row = {}) {
+  void add(Method method, std::string path, std::string operation_id, Role role, std::string summary,
+           std::string response_schema, Answer answer, http::Endpoint row = {}) {
     row.method = method;
     row.path = std::move(path);
     row.operation_id = std::move(operation_id);
