@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -19,68 +20,54 @@
 namespace joulecast::server {
 namespace {
 
-template <class Totals>
-void raise_to(const std::vector<Counter>& counters, const Totals& totals, std::size_t first = 0) {
-  for (std::size_t k = 0; k < counters.size(); ++k)
-    counters[k].raise_to(static_cast<double>(totals[first + k]));
-}
+using Series = Metrics::Series;
+using AllSeries = std::vector<Series>;
 
-template <class Names>
-std::vector<Counter> counters_of(Metrics& metrics, const std::string& name, const std::string& help,
-                                 const std::string& label, const Names& values) {
-  return metrics.counters(name, help, label, {std::begin(values), std::end(values)});
+// Totals by the values of a label, from the `first` value on.
+template <class Names, class Totals>
+Series by_label(std::string name, std::string help, const std::string& label, const Names& values,
+                const Totals& totals, std::size_t first = 0) {
+  Series series(std::move(name), std::move(help));
+  for (std::size_t k = first; k < std::size(values); ++k)
+    series.rows.emplace_back(Labels{{label, std::string(values[k])}}, static_cast<double>(totals[k]));
+  return series;
 }
 
 void export_missions(Metrics& metrics, const ingest::IngestCounters& counters) {
-  const auto started = metrics.counters("joulecast_missions_started_total", "Missions begun", "kind",
-                                        {"announced", "implicit"});
-  std::vector<std::string> states;  // but for the first one, open
-  for (std::size_t k = 1; k < history::mission_state_count; ++k)
-    states.emplace_back(history::name(static_cast<history::MissionState>(k)));
-  const auto ended = metrics.counters("joulecast_missions_ended_total", "Missions ended", "state", states);
-  const auto left_out =
-      counters_of(metrics, "joulecast_missions_left_out_total", "Missions that were not used for training",
-                  "reason", ingest::left_out_names);
-  metrics.before_scrape([=, &counters] {
-    raise_to(started, counters.missions_started);
-    raise_to(ended, counters.missions_ended, 1);
-    raise_to(left_out, counters.missions_left_out);
+  metrics.series([&counters]() -> AllSeries {
+    return {by_label("joulecast_missions_started_total", "Missions begun", "kind",
+                     std::array{"announced", "implicit"}, counters.missions_started),
+            // But for the first state, open.
+            by_label("joulecast_missions_ended_total", "Missions ended", "state",
+                     history::names_of<history::MissionState>, counters.missions_ended, 1),
+            by_label("joulecast_missions_left_out_total", "Missions that were not used for training",
+                     "reason", ingest::left_out_names, counters.missions_left_out)};
   });
 }
 
 void export_messages(Metrics& metrics, const ingest::IngestCounters& counters,
                      const ingest::IngestService& ingest) {
-  const Counter messages =
-      metrics.counter("joulecast_ingest_messages_total", "Messages received on the robots' channels");
-  const Counter samples = metrics.counter("joulecast_ingest_samples_total", "Samples accounted for");
-  const Counter covariates =
-      metrics.counter("joulecast_ingest_covariate_changes_total", "Changes of covariates within missions");
-  const auto faults =
-      counters_of(metrics, "joulecast_ingest_faults_total",
-                  "Messages, samples and events refused or repaired", "reason", ingest::ingest_fault_names);
-  const auto contradictions =
-      counters_of(metrics, "joulecast_contradictions_total",
-                  "Reported contradictions of robots' telemetry, each at most once per hour", "kind",
-                  ingest::contradiction_kind_names);
-  const Counter datagrams =
-      metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
-  const auto lost = counters_of(metrics, "joulecast_lcm_datagrams_dropped_total",
-                                "Datagrams that gave no message; kernel: lost for want of receive buffer, "
-                                "other_channel: LCM traffic of others",
-                                "reason", telemetry::datagram_fault_names);
-  const Gauge queue = metrics.gauge("joulecast_ingest_queue_messages", "Messages waiting to be accounted");
-  const Gauge receiving = metrics.gauge("joulecast_ingest_receiving", "1 while LCM is being received");
-  metrics.before_scrape([=, &counters, &ingest] {
-    messages.raise_to(static_cast<double>(counters.messages));
-    samples.raise_to(static_cast<double>(counters.samples));
-    covariates.raise_to(static_cast<double>(counters.covariate_changes));
-    raise_to(faults, counters.faults);
-    raise_to(contradictions, counters.contradictions);
-    datagrams.raise_to(static_cast<double>(counters.datagrams.received));
-    raise_to(lost, counters.datagrams.faults);
+  metrics.series([&counters, &ingest]() -> AllSeries {
     const ingest::IngestStatus status = ingest.status();
-    queue.set(static_cast<double>(status.queue_messages));
-    receiving.set(status.receiving ? 1 : 0);
+    return {{"joulecast_ingest_messages_total", "Messages received on the robots' channels",
+             counters.messages.load()},
+            {"joulecast_ingest_samples_total", "Samples accounted for", counters.samples.load()},
+            {"joulecast_ingest_covariate_changes_total", "Changes of covariates within missions",
+             counters.covariate_changes.load()},
+            by_label("joulecast_ingest_faults_total", "Messages, samples and events refused or repaired",
+                     "reason", ingest::ingest_fault_names, counters.faults),
+            by_label("joulecast_contradictions_total",
+                     "Reported contradictions of robots' telemetry, each at most once per hour", "kind",
+                     ingest::contradiction_kind_names, counters.contradictions),
+            {"joulecast_lcm_datagrams_total", "Datagrams received on the LCM group",
+             counters.datagrams.received.load()},
+            by_label(
+                "joulecast_lcm_datagrams_dropped_total",
+                "Datagrams that gave no message; kernel: lost for want of receive buffer, other_channel: LCM "
+                "traffic of others",
+                "reason", telemetry::datagram_fault_names, counters.datagrams.faults),
+            {"joulecast_ingest_queue_messages", "Messages waiting to be accounted", status.queue_messages},
+            {"joulecast_ingest_receiving", "1 while LCM is being received", status.receiving}};
   });
 }
 
@@ -103,58 +90,60 @@ FleetStatus status_of(const ingest::FleetView& fleet, std::int64_t now_utime_us)
 
 void export_fleet(Metrics& metrics, const ingest::FleetView& fleet,
                   std::function<std::int64_t()> now_utime_us) {
-  using S = FleetStatus;
-  metrics.rows<S>(
-      [&fleet, now = std::move(now_utime_us)] { return status_of(fleet, now()); },
-      {{"joulecast_robots_known", "Robots received from since the daemon started", &S::known},
-       {"joulecast_robots_live", "Robots received from within the last seconds", &S::live},
-       {"joulecast_fleet_power_watts", "Measured battery power of all live robots", &S::power_w},
-       {"joulecast_contradicted_robots",
-        "Live robots with contradicted telemetry, which is not used for training", &S::contradicted}});
+  metrics.series([&fleet, now = std::move(now_utime_us)]() -> AllSeries {
+    const auto s = status_of(fleet, now());
+    return {{"joulecast_robots_known", "Robots received from since the daemon started", s.known},
+            {"joulecast_robots_live", "Robots received from within the last seconds", s.live},
+            {"joulecast_fleet_power_watts", "Measured battery power of all live robots", s.power_w},
+            {"joulecast_contradicted_robots",
+             "Live robots with contradicted telemetry, which is not used for training", s.contradicted}};
+  });
 }
 
 void export_writer(Metrics& metrics, const history::Writer& writer) {
-  using S = history::WriterStatus;
-  metrics.rows<S>(
-      [&writer] { return writer.status(); },
-      {{"joulecast_store_queue_commands", "Commands waiting to be committed", &S::queue_commands},
-       {"joulecast_store_queue_bytes", "Memory that these commands hold", &S::queue_bytes},
-       {"joulecast_store_queue_limit_bytes", "Memory that they may hold, store.queue_bytes",
-        &S::queue_limit_bytes},
-       {"joulecast_store_shed_samples_total", "Raw samples left out of the store because its queue was full",
-        &S::shed_samples},
-       {"joulecast_store_oldest_wait_seconds", "Age of the oldest command not yet committed",
-        &S::oldest_wait_s},
-       {"joulecast_store_healthy", "1 while commits succeed", &S::healthy},
-       {"joulecast_store_commits_total", "Transactions committed", &S::commits},
-       {"joulecast_store_failed_commits_total", "Commit attempts that failed and were tried again",
-        &S::failed_commits},
-       {"joulecast_store_refused_total", "Commands that the store refused", &S::refused},
-       {"joulecast_store_commit_seconds_total", "Time spent in commits", &S::total_commit_s},
-       {"joulecast_store_pruned_missions_total", "Missions dropped by the retention", &S::pruned_missions},
-       {"joulecast_store_pruned_events_total", "Events dropped by the retention", &S::pruned_events},
-       {"joulecast_store_pruned_audit_entries_total", "Entries of the audit dropped by the retention",
-        &S::pruned_audit},
-       {"joulecast_store_pruned_chunks_total", "Raw telemetry chunks that the retention dropped",
-        &S::pruned_chunks}});
+  metrics.series([&writer]() -> AllSeries {
+    const auto s = writer.status();
+    return {{"joulecast_store_queue_commands", "Commands waiting to be committed", s.queue_commands},
+            {"joulecast_store_queue_bytes", "Memory that these commands hold", s.queue_bytes},
+            {"joulecast_store_queue_limit_bytes", "Memory that they may hold, store.queue_bytes",
+             s.queue_limit_bytes},
+            {"joulecast_store_shed_samples_total",
+             "Raw samples left out of the store because its queue was full", s.shed_samples},
+            {"joulecast_store_oldest_wait_seconds", "Age of the oldest command not yet committed",
+             s.oldest_wait_s},
+            {"joulecast_store_healthy", "1 while commits succeed", s.healthy},
+            {"joulecast_store_commits_total", "Transactions committed", s.commits},
+            {"joulecast_store_failed_commits_total", "Commit attempts that failed and were tried again",
+             s.failed_commits},
+            {"joulecast_store_refused_total", "Commands that the store refused", s.refused},
+            {"joulecast_store_commit_seconds_total", "Time spent in commits", s.total_commit_s},
+            {"joulecast_store_pruned_missions_total", "Missions dropped by the retention", s.pruned_missions},
+            {"joulecast_store_pruned_events_total", "Events dropped by the retention", s.pruned_events},
+            {"joulecast_store_pruned_audit_entries_total", "Entries of the audit dropped by the retention",
+             s.pruned_audit},
+            {"joulecast_store_pruned_chunks_total", "Raw telemetry chunks that the retention dropped",
+             s.pruned_chunks}};
+  });
 }
 
 // joulecast_store_healthy reports a store whose sizes cannot be read.
 void export_store(Metrics& metrics, StoreSizes& sizes) {
-  using S = history::StoreSize;
-  metrics.rows<S>([&sizes] { return sizes.read(); },
-                  {{"joulecast_store_bytes", "Size of the database file", &S::database_bytes},
-                   {"joulecast_store_journal_bytes", "Size of the write-ahead log", &S::journal_bytes},
-                   {"joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept",
-                    &S::telemetry_bytes}});
+  metrics.series([&sizes]() -> AllSeries {
+    const auto s = sizes.read();
+    return {
+        {"joulecast_store_bytes", "Size of the database file", s.database_bytes},
+        {"joulecast_store_journal_bytes", "Size of the write-ahead log", s.journal_bytes},
+        {"joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept", s.telemetry_bytes}};
+  });
 }
 
 void export_streams(Metrics& metrics, const http::EventHub& events) {
-  using S = http::EventHub::Counts;
-  metrics.rows<S>([&events] { return events.counts(); },
-                  {{"joulecast_event_streams", "Clients of the event stream", &S::subscribers},
-                   {"joulecast_event_streams_dropped_total",
-                    "Clients of the event stream dropped for being slow", &S::dropped_clients}});
+  metrics.series([&events]() -> AllSeries {
+    const auto s = events.counts();
+    return {{"joulecast_event_streams", "Clients of the event stream", s.subscribers},
+            {"joulecast_event_streams_dropped_total", "Clients of the event stream dropped for being slow",
+             s.dropped_clients}};
+  });
 }
 
 // Fields of /proc/self/stat from the third on, proc(5): the second, the program's name, may hold spaces.
@@ -181,7 +170,7 @@ double open_files() {
   return static_cast<double>(std::distance(begin(entries), end(entries)));
 }
 
-std::vector<Metrics::Series> read_process() {
+AllSeries read_process() {
   const std::vector<double> stat = stat_fields();
   if (stat.size() < 21) return {};
   // Its fields are counted from 1, and the first of `stat` is the fourth.
@@ -189,25 +178,22 @@ std::vector<Metrics::Series> read_process() {
   const auto ticks = static_cast<double>(sysconf(_SC_CLK_TCK));
   rlimit files{};
   getrlimit(RLIMIT_NOFILE, &files);
-  const auto one = [](std::string name, std::string help, double value) {
-    return Metrics::Series{std::move(name), std::move(help), {{{}, value}}};
-  };
   return {
-      one("process_cpu_seconds_total", "User and system CPU time", (field(14) + field(15)) / ticks),
-      one("process_start_time_seconds", "Start of the process since 1970", boot_time_s() + field(22) / ticks),
-      one("process_threads", "Threads", field(20)),
-      one("process_virtual_memory_bytes", "Virtual memory", field(23)),
-      one("process_resident_memory_bytes", "Resident memory",
-          field(24) * static_cast<double>(sysconf(_SC_PAGESIZE))),
-      one("process_open_fds", "Open file descriptors", open_files()),
-      one("process_max_fds", "Limit of open file descriptors", static_cast<double>(files.rlim_cur)),
+      {"process_cpu_seconds_total", "User and system CPU time", (field(14) + field(15)) / ticks},
+      {"process_start_time_seconds", "Start of the process since 1970", boot_time_s() + field(22) / ticks},
+      {"process_threads", "Threads", field(20)},
+      {"process_virtual_memory_bytes", "Virtual memory", field(23)},
+      {"process_resident_memory_bytes", "Resident memory",
+       field(24) * static_cast<double>(sysconf(_SC_PAGESIZE))},
+      {"process_open_fds", "Open file descriptors", open_files()},
+      {"process_max_fds", "Limit of open file descriptors", static_cast<double>(files.rlim_cur)},
   };
 }
 
 // In the order of the enumeration.
 enum Place { live, silent, power, modelled, charge, drawn, returned, ledger, ratio };
 
-std::vector<Metrics::Series> empty_series() {
+AllSeries empty_series() {
   return {
       {"joulecast_robot_live", "1 while the robot's telemetry arrives"},
       {"joulecast_robot_silent_seconds", "Time since the robot's last message"},
@@ -225,12 +211,12 @@ std::vector<Metrics::Series> empty_series() {
 
 static_assert(history::MissionState{} == history::MissionState::open);
 
-std::optional<history::StoreSize> StoreSizes::read() {
+history::StoreSize StoreSizes::read() {
   constexpr std::chrono::milliseconds longest_wait{100};
   if (!reading_.valid()) reading_ = std::async(std::launch::async, [this] { return store_.size(); });
-  if (reading_.wait_for(longest_wait) != std::future_status::ready) return std::nullopt;
-  const Result<history::StoreSize> size = reading_.get();
-  return size ? std::optional(*size) : std::nullopt;
+  if (reading_.wait_for(longest_wait) == std::future_status::ready)
+    if (const Result<history::StoreSize> size = reading_.get()) last_ = *size;
+  return last_;
 }
 
 void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
@@ -246,103 +232,90 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
 }
 
 void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
-  using S = ClusterStatus;
-  metrics.rows<S>(
-      [&cluster] { return cluster.status(); },
-      {{"joulecast_cluster_members", "Daemons of the cluster that renew their memberships",
-        [](const S& s) {
-          return static_cast<double>(
-              std::ranges::count_if(s.state.members, [](const auto& m) { return m.expires_in_s > 0; }));
-        }},
-       {"joulecast_cluster_robots_kept", "Robots that this daemon keeps", &S::kept},
-       {"joulecast_cluster_robots_free", "Robots that no daemon keeps for now",
-        [](const S& s) {
-          return static_cast<double>(std::ranges::count_if(s.state.leases, [&](const history::Lease& lease) {
-            return std::ranges::find(s.state.members, lease.node, &history::Member::node) ==
-                   s.state.members.end();
-          }));
-        }},
-       {"joulecast_cluster_renewed_age_seconds", "Time since this daemon last renewed its membership",
-        &S::renewed_s},
-       {"joulecast_cluster_held_messages", "Messages held of robots that other daemons keep, for a takeover",
-        &S::held_messages},
-       {"joulecast_cluster_held_bytes", "Memory that these hold", &S::held_bytes},
-       {"joulecast_cluster_held_messages_dropped_total", "Held messages discarded from a full queue",
-        &S::held_dropped},
-       {"joulecast_cluster_takeovers_total", "Robots that this daemon took over from failed daemons",
-        &S::takeovers},
-       {"joulecast_cluster_handovers_total",
-        "Robots that this daemon handed to another that joined or receives them", &S::handovers},
-       {"joulecast_cluster_missions_resumed_total", "Open missions that this daemon took over",
-        &S::resumed_missions},
-       {"joulecast_cluster_commands_dropped_total",
-        "Commands of this daemon that were not stored: another one keeps the robot now",
-        &S::dropped_commands},
-       {"joulecast_cluster_memberships_lost_total",
-        "Times that this daemon was away for longer than cluster.lease_s", &S::memberships_lost}});
+  metrics.series([&cluster]() -> AllSeries {
+    const auto s = cluster.status();
+    return {
+        {"joulecast_cluster_members", "Daemons of the cluster that renew their memberships",
+         std::ranges::count_if(s.state.members, [](const auto& m) { return m.expires_in_s > 0; })},
+        {"joulecast_cluster_robots_kept", "Robots that this daemon keeps", s.kept},
+        {"joulecast_cluster_robots_free", "Robots that no daemon keeps for now",
+         std::ranges::count_if(s.state.leases,
+                               [&](const history::Lease& lease) {
+                                 return std::ranges::find(s.state.members, lease.node,
+                                                          &history::Member::node) == s.state.members.end();
+                               })},
+        {"joulecast_cluster_renewed_age_seconds", "Time since this daemon last renewed its membership",
+         s.renewed_s},
+        {"joulecast_cluster_held_messages", "Messages held of robots that other daemons keep, for a takeover",
+         s.held_messages},
+        {"joulecast_cluster_held_bytes", "Memory that these hold", s.held_bytes},
+        {"joulecast_cluster_held_messages_dropped_total", "Held messages discarded from a full queue",
+         s.held_dropped},
+        {"joulecast_cluster_takeovers_total", "Robots that this daemon took over from failed daemons",
+         s.takeovers},
+        {"joulecast_cluster_handovers_total",
+         "Robots that this daemon handed to another that joined or receives them", s.handovers},
+        {"joulecast_cluster_missions_resumed_total", "Open missions that this daemon took over",
+         s.resumed_missions},
+        {"joulecast_cluster_commands_dropped_total",
+         "Commands of this daemon that were not stored: another one keeps the robot now", s.dropped_commands},
+        {"joulecast_cluster_memberships_lost_total",
+         "Times that this daemon was away for longer than cluster.lease_s", s.memberships_lost}};
+  });
 }
 
 void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, const GapWatch& watch,
                         const ModelAdoption& adoption) {
-  const std::vector<Counter> ended =
-      metrics.counters("joulecast_diagnoses_ended_total", "Diagnoses that ended since the start", "state",
-                       std::vector<std::string>{"done", "failed", "cancelled"});
-  using Jobs = DiagnosisCounts;
-  metrics.rows<Jobs>([&diagnoses] { return diagnoses.counts(); },
-                     {{"joulecast_diagnosis_seconds_total", "Time spent on diagnoses", &Jobs::seconds},
-                      {"joulecast_diagnoses_waiting", "Waiting diagnoses", &Jobs::waiting},
-                      {"joulecast_diagnosis_running", "1 while a diagnosis runs", &Jobs::running}});
-  using Seen = WatchCounts;
-  metrics.rows<Seen>(
-      [&watch] { return watch.counts(); },
-      {{"joulecast_gap_watch_rounds_total", "Examinations of all robots' missions", &Seen::rounds},
-       {"joulecast_gap_drifts_total", "Drifts of the gap found", &Seen::drifts},
-       {"joulecast_gap_drifting_robots", "Robots with a drift of the gap under their model in force",
-        &Seen::drifting},
-       {"joulecast_gap_outlying_robots", "Robots that differ significantly from the others of their kind",
-        &Seen::standing_out},
-       {"joulecast_gap_ratio_min", "Smallest of the robots' measured over modelled energy, newest missions",
-        &Seen::ratio_min},
-       {"joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy",
-        &Seen::ratio_median},
-       {"joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy",
-        &Seen::ratio_max}});
-  const std::vector<Counter> adoptions =
-      metrics.counters("joulecast_models_tested_total", "Models that were back-tested to be adopted",
-                       "outcome", std::vector<std::string>{"adopted", "forced", "refused"});
-  metrics.before_scrape([=, &diagnoses, &adoption] {
+  metrics.series([&diagnoses, &watch, &adoption]() -> AllSeries {
     const DiagnosisCounts jobs = diagnoses.counts();
-    ended[0].raise_to(static_cast<double>(jobs.done));
-    ended[1].raise_to(static_cast<double>(jobs.failed));
-    ended[2].raise_to(static_cast<double>(jobs.cancelled));
+    const WatchCounts seen = watch.counts();
     const AdoptionCounts models = adoption.counts();
-    adoptions[0].raise_to(static_cast<double>(models.adopted));
-    adoptions[1].raise_to(static_cast<double>(models.forced));
-    adoptions[2].raise_to(static_cast<double>(models.refused));
+    return {
+        by_label("joulecast_diagnoses_ended_total", "Diagnoses that ended since the start", "state",
+                 std::array{"done", "failed", "cancelled"},
+                 std::array{jobs.done, jobs.failed, jobs.cancelled}),
+        {"joulecast_diagnosis_seconds_total", "Time spent on diagnoses", jobs.seconds},
+        {"joulecast_diagnoses_waiting", "Waiting diagnoses", jobs.waiting},
+        {"joulecast_diagnosis_running", "1 while a diagnosis runs", jobs.running},
+        {"joulecast_gap_watch_rounds_total", "Examinations of all robots' missions", seen.rounds},
+        {"joulecast_gap_drifts_total", "Drifts of the gap found", seen.drifts},
+        {"joulecast_gap_drifting_robots", "Robots with a drift of the gap under their model in force",
+         seen.drifting},
+        {"joulecast_gap_outlying_robots", "Robots that differ significantly from the others of their kind",
+         seen.standing_out},
+        {"joulecast_gap_ratio_min", "Smallest of the robots' measured over modelled energy, newest missions",
+         seen.ratio_min},
+        {"joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy",
+         seen.ratio_median},
+        {"joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy", seen.ratio_max},
+        by_label("joulecast_models_tested_total", "Models that were back-tested to be adopted", "outcome",
+                 std::array{"adopted", "forced", "refused"},
+                 std::array{models.adopted, models.forced, models.refused})};
   });
 }
 
 void export_attention_metrics(Metrics& metrics, const api::AttentionList& list) {
   metrics.series([&list] {
-    Metrics::Series all{"joulecast_attention",
-                        "Robots, or the service, on the attention list and not acknowledged, by severity"};
+    Series all{"joulecast_attention",
+               "Robots, or the service, on the attention list and not acknowledged, by severity"};
     for (const std::string_view severity : api::severity_names)
       all.rows.emplace_back(Labels{{"severity", std::string(severity)}}, 0);
     for (const api::AttentionEntry& entry : list.entries())
       if (const api::AttentionReason& worst = entry.reasons.front(); !worst.acknowledged)
         ++all.rows[static_cast<std::size_t>(worst.severity)].second;
-    return std::vector<Metrics::Series>{std::move(all)};
+    return AllSeries{std::move(all)};
   });
 }
 
 void export_mqtt_metrics(Metrics& metrics, const BatteryTopics& topics) {
-  using S = BatteryTopics::Status;
-  metrics.rows<S>(
-      [&topics] { return topics.status(); },
-      {{"joulecast_mqtt_connected", "Whether the MQTT broker is connected", &S::connected},
-       {"joulecast_mqtt_connections_total", "Connections made to the MQTT broker", &S::connections},
-       {"joulecast_mqtt_published_total", "Battery messages handed to the MQTT broker", &S::published},
-       {"joulecast_mqtt_failed_total", "Messages that were not, since the connection was lost", &S::failed}});
+  metrics.series([&topics]() -> AllSeries {
+    const auto s = topics.status();
+    return {
+        {"joulecast_mqtt_connected", "Whether the MQTT broker is connected", s.connected},
+        {"joulecast_mqtt_connections_total", "Connections made to the MQTT broker", s.connections},
+        {"joulecast_mqtt_published_total", "Battery messages handed to the MQTT broker", s.published},
+        {"joulecast_mqtt_failed_total", "Messages that were not, since the connection was lost", s.failed}};
+  });
 }
 
 void export_process_metrics(Metrics& metrics) {
@@ -355,14 +328,14 @@ void export_process_metrics(Metrics& metrics) {
 
 void export_robot_metrics(Metrics& metrics, const ingest::FleetView& fleet, const GapWatch& watch,
                           std::function<std::int64_t()> now_utime_us, std::size_t most_robots) {
-  const Gauge left_out = metrics.gauge("joulecast_robots_without_metrics",
-                                       "Robots beyond metrics.robots, without metrics of their own");
-  metrics.series([left_out, &fleet, &watch, most_robots, now = std::move(now_utime_us)] {
+  metrics.series([&fleet, &watch, most_robots, now = std::move(now_utime_us)] {
     const auto robots = fleet.all();
     const std::size_t shown = std::min(most_robots, robots.size());
-    left_out.set(static_cast<double>(robots.size() - shown));
-    if (most_robots == 0) return std::vector<Metrics::Series>{};
-    std::vector<Metrics::Series> all = empty_series();
+    const Series left_out{"joulecast_robots_without_metrics",
+                          "Robots beyond metrics.robots, without metrics of their own",
+                          robots.size() - shown};
+    if (most_robots == 0) return AllSeries{left_out};
+    AllSeries all = empty_series();
     const std::int64_t at_utime_us = now();
     const std::map<std::string, double> ratios = watch.counts().ratios;
     for (std::size_t k = 0; k < shown; ++k) {
@@ -386,13 +359,14 @@ void export_robot_metrics(Metrics& metrics, const ingest::FleetView& fleet, cons
             Labels{{"robot_id", robot.robot_id}, {"term", std::string(signals::term_names[term])}},
             robot.ledger.value[term]);
     }
+    all.push_back(left_out);
     return all;
   });
 }
 
 void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks) {
   metrics.series([&webhooks] {
-    std::vector<Metrics::Series> all{
+    AllSeries all{
         {"joulecast_webhook_delivered_total", "Events delivered"},
         {"joulecast_webhook_failed_total", "Attempts to deliver an event that failed"},
         {"joulecast_webhook_dropped_total", "Events dropped since too many waited (webhooks.queue)"},

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <functional>
 #include <future>
-#include <optional>
 
 #include "history/store.h"
 #include "history/writer.h"
@@ -27,13 +26,14 @@ namespace joulecast::server {
 class StoreSizes {
  public:
   explicit StoreSizes(const history::Store& store) : store_(store) {}
-  // Begins to read them unless they are still being read; those that were read within 100 ms, else nothing.
-  // One thread at a time.
-  std::optional<history::StoreSize> read();
+  // Begins to read them unless they are still being read. Those that were read within 100 ms, else those
+  // before, at first zeros. One thread at a time.
+  history::StoreSize read();
 
  private:
   const history::Store& store_;
   std::future<Result<history::StoreSize>> reading_;
+  history::StoreSize last_;
 };
 
 // Exports the counters of the parts, refreshed at each scrape. The parts must outlive `metrics`.

@@ -34,12 +34,6 @@ void Counter::add(double amount) const {
   if (counter_ != nullptr) counter_->Increment(amount);
 }
 
-void Counter::raise_to(double total) const {
-  if (counter_ == nullptr) return;
-  const double missing = total - counter_->Value();
-  if (missing > 0) counter_->Increment(missing);
-}
-
 void Gauge::set(double value) const {
   if (gauge_ != nullptr) gauge_->Set(value);
 }
@@ -51,7 +45,6 @@ void Histogram::observe(double value) const {
 struct Metrics::State {
   prometheus::Registry registry;
   mutable std::mutex mutex;
-  std::vector<std::function<void()>> refreshers;
   std::vector<std::function<std::vector<Series>()>> readers;
 };
 
@@ -107,20 +100,13 @@ std::vector<Counter> Metrics::counters(const std::string& name, const std::strin
   return made;
 }
 
-void Metrics::before_scrape(std::function<void()> refresh) {
-  const std::lock_guard lock(state_->mutex);
-  state_->refreshers.push_back(std::move(refresh));
-}
-
 void Metrics::series(std::function<std::vector<Series>()> read) {
   const std::lock_guard lock(state_->mutex);
   state_->readers.push_back(std::move(read));
 }
 
 std::string Metrics::text() const {
-  // The lock also keeps concurrent scrapes from raising one counter twice.
   const std::lock_guard lock(state_->mutex);
-  for (const auto& refresh : state_->refreshers) refresh();
   std::vector<prometheus::MetricFamily> families = state_->registry.Collect();
   for (const auto& read : state_->readers)
     for (const Series& series : read()) families.push_back(family_of(series));

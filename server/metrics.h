@@ -2,7 +2,6 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,8 +22,6 @@ class Counter {
  public:
   Counter() = default;
   void add(double amount = 1) const;
-  // Raises the counter to an external total; smaller totals are ignored, since counters never fall.
-  void raise_to(double total) const;
 
  private:
   friend class Metrics;
@@ -70,48 +67,21 @@ class Metrics {
   std::vector<Counter> counters(const std::string& name, const std::string& help, const std::string& label,
                                 const std::vector<std::string>& values);
 
-  // Called before each text() to set gauges from other state. Must be thread-safe.
-  void before_scrape(std::function<void()> refresh);
-
-  // Metrics with changing label values, all read again before each text(); values that are left out
-  // disappear. The reader bounds their number and must be thread-safe. Names as above, or process_<what>,
-  // Prometheus's convention for all programs.
+  // Metrics that are read again before each text(): counters where the name ends in _total, otherwise gauges.
+  // Values of labels that are left out disappear; the reader bounds their number and must be thread-safe.
+  // Names as above, or process_<what>, Prometheus's convention for all programs.
   struct Series {
     std::string name;
     std::string help;
     std::vector<std::pair<Labels, double>> rows = {};
+
+    Series(std::string metric, std::string meaning) : name(std::move(metric)), help(std::move(meaning)) {}
+    // Of one value without labels.
+    template <class Number>
+    Series(std::string metric, std::string meaning, Number value)
+        : name(std::move(metric)), help(std::move(meaning)), rows{{{}, static_cast<double>(value)}} {}
   };
   void series(std::function<std::vector<Series>()> read);
-
-  // A metric of a part's status: a counter where the name ends in _total, otherwise a gauge.
-  template <class Status>
-  struct Row {
-    Row(std::string metric, std::string meaning, std::function<double(const Status&)> of)
-        : name(std::move(metric)), help(std::move(meaning)), value(std::move(of)) {}
-    template <class T>
-    Row(std::string metric, std::string meaning, T Status::*member)
-        : Row(std::move(metric), std::move(meaning),
-              [member](const Status& s) { return static_cast<double>(s.*member); }) {}
-    std::string name, help;
-    std::function<double(const Status&)> value;
-  };
-  // Metrics of a status that is read once before each text(); where there is none, the last values stay.
-  template <class Status>
-  void rows(std::function<std::optional<Status>()> read, const std::vector<Row<Status>>& table) {
-    std::vector<std::function<void(const Status&)>> all;
-    for (const Row<Status>& row : table) {
-      if (row.name.ends_with("_total"))
-        all.push_back(
-            [to = counter(row.name, row.help), of = row.value](const Status& s) { to.raise_to(of(s)); });
-      else
-        all.push_back([to = gauge(row.name, row.help), of = row.value](const Status& s) { to.set(of(s)); });
-    }
-    before_scrape([read = std::move(read), all = std::move(all)] {
-      const std::optional<Status> status = read();
-      if (!status) return;
-      for (const auto& put : all) put(*status);
-    });
-  }
 
   // Prometheus text exposition format 0.0.4.
   std::string text() const;
