@@ -14,17 +14,24 @@ from pathlib import Path
 import markdown
 
 
+METHODS = ["get", "put", "post", "delete"]
+
+
+def component(schema):
+    return schema["$ref"].rsplit("/", 1)[-1]
+
+
 def resolve(document, schema):
     while "$ref" in schema:
         node = document
-        for part in schema["$ref"].lstrip("#/").split("/"):
-            node = node[part.replace("~1", "/").replace("~0", "~")]
+        for part in schema["$ref"].split("/")[1:]:
+            node = node[part]
         schema = node
     return schema
 
 
 def kind(document, schema):
-    name = schema["$ref"].rsplit("/", 1)[-1] if "$ref" in schema else None
+    name = component(schema) if "$ref" in schema else None
     schema = resolve(document, schema)
     if "enum" in schema:
         return " \\| ".join(f"`{'null' if value is None else value}`" for value in schema["enum"])
@@ -59,6 +66,10 @@ def cell(text):
     return re.sub(r"\s+", " ", text).replace("|", "\\|").replace("\\\\|", "\\|")
 
 
+def described(words, schema):
+    return "; ".join(filter(None, (cell(words), bounds(schema))))
+
+
 def fields(document, schema, prefix="", depth=3):
     """Returns the rows of a table of an object's fields, each followed by those of its own fields; none for other types."""
     schema = resolve(document, schema)
@@ -76,10 +87,8 @@ def fields(document, schema, prefix="", depth=3):
         if f"({name}=" in prefix:  # the constant of this choice
             continue
         full = {**resolve(document, field), **{k: v for k, v in field.items() if k != "$ref"}}
-        description = cell(full.get("description", "")).rstrip(".")
-        limits = bounds(full)
         rows.append(f"| `{prefix}{name}`{'' if name in required else ' (optional)'} | {kind(document, field)} | "
-                    f"{description}{'; ' if description and limits else ''}{limits} |")
+                    f"{described(full.get('description', '').rstrip('.'), full)} |")
         inner = resolve(document, full["items"]) if "items" in full else full
         if depth > 1:
             rows += fields(document, inner, f"{prefix}{name}{'[]' if 'items' in full else ''}.", depth - 1)
@@ -111,14 +120,10 @@ def example(title, content):
     return [title, "", "```json", *json.dumps(content["example"], indent=2, ensure_ascii=False).splitlines(), "```", ""]
 
 
-def events(document, content):
+def events(content):
     """Returns the rows of a table of a stream's events."""
-    kinds = content.get("schema", {}).get("contentSchema", {}).get("items", {}).get("oneOf", ())
-    return [f"| `{kind['properties']['event']['const']}` | {component(kind['properties']['data'])} | {cell(kind['description'])} |" for kind in kinds]
-
-
-def component(schema):
-    return f"`{schema['$ref'].rsplit('/', 1)[-1]}`"
+    kinds = content["schema"]["contentSchema"]["items"]["oneOf"] if content else ()
+    return [f"| `{kind['properties']['event']['const']}` | `{component(kind['properties']['data'])}` | {cell(kind['description'])} |" for kind in kinds]
 
 
 def render(document):
@@ -127,41 +132,27 @@ def render(document):
              "body, beginning with `/`, or the name of a query or path parameter or of a header. Numbers nearer "
              "to 0 than 1e-18 are written as 0, except in raw telemetry.", "", *COMMON, ""]
     for path, item in document["paths"].items():
-        for method in ("get", "put", "post", "delete"):
-            if method not in item:
-                continue
+        for method in sorted(item, key=METHODS.index):
             operation = item[method]
-            lines += [f"## {method.upper()} {path}", "", operation.get("summary", ""), ""]
-            if operation.get("description"):
-                lines += [operation["description"], ""]
-            parameters = [resolve(document, p) for p in operation.get("parameters", item.get("parameters", []))]
+            lines += [f"## {method.upper()} {path}", "", operation["summary"], ""]
             lines += table("Parameters:", [
-                f"| `{p['name']}` ({p['in']}{'' if p.get('required') else ', optional'}) | {kind(document, p['schema'])} | "
-                f"{cell(p.get('description', ''))}{'; ' if p.get('description') and bounds(p['schema']) else ''}"
-                f"{bounds(resolve(document, p['schema']))} |" for p in parameters])
-            body = resolve(document, operation.get("requestBody", {})).get("content", {})
-            for media, content in body.items():
+                f"| `{p['name']}` ({p['in']}{'' if p['required'] else ', optional'}) | {kind(document, p['schema'])} | "
+                f"{described(p['description'], p['schema'])} |" for p in operation.get("parameters", [])])
+            for media, content in operation.get("requestBody", {}).get("content", {}).items():
                 lines += table(f"Body, `{media}`:", fields(document, content.get("schema", {})))
                 lines += example("For example:", content)
-            problems = [status for status in operation["responses"] if not status.startswith("2")]
-            for status, response in operation["responses"].items():
-                if status in problems:
-                    continue
-                response = resolve(document, response)
-                media = ", ".join(f"`{m}`" for m in response.get("content", {})) or "no body"
-                note = response.get("description", "")
-                lines.append(f"Answers {status} with {media}{'' if note in ('', 'OK') else ': ' + note}.")
-            lines += [f"Problems: {', '.join(problems)}." if problems else "", ""]
-            for status, response in operation["responses"].items():
-                if not status.startswith("2"):
-                    continue
-                contents = resolve(document, response).get("content", {})
-                content = contents.get("application/json", {})
-                lines += table(f"Fields of {status}:", fields(document, content.get("schema", {})))
-                lines += example("For example, with lists cut short:", content)
-                rows = events(document, contents.get("text/event-stream", {}))
-                if rows:
-                    lines += ["Events:", "", "| event | data, a schema of `schemas/openapi.json` | when |", "|---|---|---|", *rows, ""]
+            (status, success), *problems = operation["responses"].items()
+            contents = success.get("content", {})
+            media = ", ".join(f"`{m}`" for m in contents) or "no body"
+            note = success["description"]
+            lines.append(f"Answers {status} with {media}{'' if note == 'OK' else ': ' + note}.")
+            lines += [f"Problems: {', '.join(problem for problem, _ in problems)}.", ""]
+            content = contents.get("application/json", {})
+            lines += table(f"Fields of {status}:", fields(document, content.get("schema", {})))
+            lines += example("For example, with lists cut short:", content)
+            rows = events(contents.get("text/event-stream", {}))
+            if rows:
+                lines += ["Events:", "", "| event | data, a schema of `schemas/openapi.json` | when |", "|---|---|---|", *rows, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -172,7 +163,7 @@ def settings(schema):
     for group, members in schema["properties"].items():
         for name, setting in members.get("properties", {}).items():
             kind = " \\| ".join(f"`{v}`" for v in setting["enum"]) if "enum" in setting else setting["type"]
-            lines.append(f"| `{group}.{name}` | {kind} | {cell(setting['description'])}; {bounds(setting)} |")
+            lines.append(f"| `{group}.{name}` | {kind} | {described(setting['description'], setting)} |")
     return "\n".join(lines) + "\n"
 
 
