@@ -72,23 +72,14 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const GivenMotion
   return p;
 }
 
-EstimateOutput output_of(const signals::Accounts& accounts) {
-  EstimateOutput out;
-  out.energy_j = accounts.battery_j;
-  out.duration_s = accounts.duration_s;
-  out.distance_m = accounts.distance_m;
-  out.turned_rad = accounts.turned_rad;
-  out.accounts = accounts;
-  return out;
-}
-
 Result<EstimateOutput> of_motion(const GivenMotion& motion, bool columns, const ModelInForce& model) {
   auto priced = energy::estimate_motion(model.drive, motion.points, motion.payload_kg, motion.start);
   if (!priced) {
     priced.error().field.insert(0, "/profile/");
     return tl::unexpected(std::move(priced.error()));
   }
-  EstimateOutput out = output_of(*priced);
+  EstimateOutput out;
+  out.accounts = *priced;
   planning::Peaks peaks;
   planning::Profile series = series_of(model.drive, motion, peaks);
   out.beyond_limits = peaks.beyond(planning::limits_of(model.robot));
@@ -100,13 +91,12 @@ Result<EstimateOutput> of_optimum(DriveInput drive, bool columns, const ModelInF
                                   const std::stop_token& stop) {
   drive.problem.rows = columns;
   TRY_ASSIGN(auto best, plan(drive, model, stop));
-  signals::Accounts accounts;
-  accounts.battery_j = accounts.modelled_j = best.summary.energy_j;
-  accounts.ledger = best.ledger;
-  accounts.duration_s = best.summary.duration_s;
-  accounts.distance_m = best.summary.distance_m;
-  accounts.turned_rad = best.summary.turned_rad;
-  EstimateOutput out = output_of(accounts);
+  EstimateOutput out;
+  out.accounts.battery_j = best.summary.energy_j;
+  out.accounts.ledger = best.ledger;
+  out.accounts.duration_s = best.summary.duration_s;
+  out.accounts.distance_m = best.summary.distance_m;
+  out.accounts.turned_rad = best.summary.turned_rad;
   if (columns) out.columns = std::move(best.profile);
   return out;
 }
@@ -123,10 +113,10 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   const forecast::Prediction expected = forecaster.energy(sum);
   EstimateOutput out;
   out.siblings_pending = robot.siblings_pending;
-  out.energy_j = expected.mean();
-  out.duration_s = forecaster.duration(sum).quantile(0.5);
-  out.distance_m = path.distance_m();
-  out.turned_rad = path.turned_rad();
+  out.accounts.battery_j = expected.mean();
+  out.accounts.duration_s = forecaster.duration(sum).quantile(0.5);
+  out.accounts.distance_m = path.distance_m();
+  out.accounts.turned_rad = path.turned_rad();
   auto& quantiles = out.energy_quantiles_j.emplace();
   std::ranges::transform(forecast::stated_quantiles, quantiles.begin(),
                          [&](double q) { return expected.quantile(q); });
@@ -296,11 +286,12 @@ const Table<EstimateAnswer>& estimate_table() {
                                                                            : name_of(a.input.driving);
               },
               std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
-          .value("energy_j", AT(output.energy_j),
+          .value("energy_j", AT(output.accounts.battery_j),
                  "from the battery; of usual driving the mean of its forecast")
-          .value("duration_s", AT(output.duration_s), "from start to end")
-          .value("distance_m", AT(output.distance_m), "driven distance, forward and backward both positive")
-          .value("turned_rad", AT(output.turned_rad), "turned angle, both senses positive")
+          .value("duration_s", AT(output.accounts.duration_s), "from start to end")
+          .value("distance_m", AT(output.accounts.distance_m),
+                 "driven distance, forward and backward both positive")
+          .value("turned_rad", AT(output.accounts.turned_rad), "turned angle, both senses positive")
           .object("energy_quantiles_j", AT(output.energy_quantiles_j),
                   "of usual driving, the forecast of energy_j; else null", quantiles_table())
           .value("siblings_pending", [](const A&) { return true; },
@@ -315,8 +306,9 @@ const Table<EstimateAnswer>& estimate_table() {
               "more than 0.0015 of it, current and voltage only while a wheel turns at 0.05 rad/s or faster. "
               "Empty for a path: its plan satisfies the limits",
               broken)
-          .object("ledger", AT(output.accounts), "null for usual driving: its forecast has no terms",
-                  ledger_table())
+          .object(
+              "ledger", [](const A& a) { return a.output.energy_quantiles_j ? nullptr : &a.output.accounts; },
+              "null for usual driving: its forecast has no terms", ledger_table())
           .object(
               "profile", [](const A& a) -> const auto& { return *a.output.columns; },
               "the motion over time, if columns are requested; positions are null without start_pose",

@@ -29,9 +29,8 @@ struct EstimateInput {
 };
 
 struct EstimateOutput {
-  double energy_j = 0;  // from the battery; of usual driving its expectation
-  double duration_s = 0, distance_m = 0, turned_rad = 0;
-  std::optional<signals::Accounts> accounts;                // not of usual driving
+  // Of usual driving without a ledger; its energy is an expectation.
+  signals::Accounts accounts;
   std::optional<std::array<double, 3>> energy_quantiles_j;  // of usual driving, at forecast::stated_quantiles
   std::vector<planning::BrokenLimit> beyond_limits;         // by a given motion
   std::optional<planning::Profile> columns;                 // where requested
