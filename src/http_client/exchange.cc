@@ -2,13 +2,17 @@
 // <utility> comes first: Boost 1.74's awaitable.hpp uses std::exchange without including it.
 #include <utility>
 // clang-format off
-#include <boost/asio/connect.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/ssl.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+#include <optional>
 // clang-format on
 
 #include "http_client/http_client.h"
@@ -23,33 +27,23 @@ using asio::ip::tcp;
 
 constexpr std::uint64_t body_limit_bytes = 256u << 20;
 
-// Beast has no timeouts for blocking calls, so the exchange runs as a chain of asynchronous steps on a loop
-// of its own under one deadline.
+template <class T>
+using Task = asio::awaitable<T>;
+
+// One exchange. Beast has no timeouts for blocking calls, so that it is a coroutine on a loop of its own
+// under one deadline.
 class Exchange {
  public:
-  Exchange(const ServerAddress& server, http::request<http::string_body> request,
-           ClientCertificate certificate, bool status_only, std::chrono::milliseconds timeout)
-      : server_(server),
-        request_(std::move(request)),
-        certificate_(std::move(certificate)),
-        status_only_(status_only),
-        resolver_(loop_),
-        stream_(loop_),
-        timeout_(timeout) {
-    parser_.body_limit(body_limit_bytes);
-  }
+  Exchange(const ServerAddress& server, const HttpRequest& wanted, std::chrono::milliseconds timeout)
+      : server_(server), wanted_(wanted), timeout_(timeout) {}
 
-  Result<HttpReply> run() {
-    if (server_.tls && !prepare_tls()) return std::move(*outcome_);
-    resolver_.async_resolve(server_.host, server_.port, [this](beast::error_code error, const auto& found) {
-      if (settle(error, "find the host")) return;
-      stream_.expires_after(timeout_);
-      stream_.async_connect(found,
-                            [this](beast::error_code failed, const tcp::endpoint&) { shake_hands(failed); });
+  Result<HttpReply> run(const http::request<http::string_body>& request) {
+    Result<HttpReply> outcome = failure("no answer within the timeout");
+    asio::co_spawn(loop_, talk(request), [&outcome](const std::exception_ptr&, Result<HttpReply> reply) {
+      outcome = std::move(reply);
     });
     loop_.run_for(timeout_ + std::chrono::milliseconds(200));
-    if (!outcome_) return failure("no answer within the timeout");
-    return std::move(*outcome_);
+    return outcome;
   }
 
  private:
@@ -58,93 +52,74 @@ class Exchange {
                 (server_.tls ? "https://" : "http://") + server_.host + ":" + server_.port, why);
   }
 
-  bool settle(beast::error_code error, const char* step, const char* hint = "") {
-    if (!error) return false;
-    outcome_ = failure(std::string("cannot ") + step + ": " + error.message() + hint);
-    return true;
+  auto step() { return asio::redirect_error(asio::use_awaitable, error_); }
+
+  // The fault of the last step.
+  tl::unexpected<Error> cannot(const std::string& what, const char* hint = "") const {
+    return failure("cannot " + what + ": " + error_.message() + hint);
+  }
+
+  Task<Result<HttpReply>> talk(const http::request<http::string_body>& request) {
+    if (server_.tls)
+      if (auto prepared = prepare_tls(); !prepared) co_return tl::unexpected(std::move(prepared.error()));
+    tcp::resolver resolver(loop_);
+    const auto found = co_await resolver.async_resolve(server_.host, server_.port, step());
+    if (error_) co_return cannot("find the host");
+    stream_.expires_after(timeout_);
+    co_await stream_.async_connect(found, step());
+    if (error_) co_return cannot("connect", "; is joulecastd running there?");
+    if (!tls_) co_return co_await ask(stream_, request);
+    co_await tls_->async_handshake(asio::ssl::stream_base::client, step());
+    if (error_) co_return cannot("agree on TLS", "; SSL_CERT_FILE names the certificates to trust");
+    co_return co_await ask(*tls_, request);
   }
 
   // Trusts the system's authorities, or those that SSL_CERT_FILE or SSL_CERT_DIR name.
-  bool prepare_tls() {
-    beast::error_code error;
-    trust_.set_default_verify_paths(error);
-    if (settle(error, "read the trusted certificates")) return false;
-    if (!certificate_.file.empty()) trust_.use_certificate_chain_file(certificate_.file, error);
-    if (settle(error, "use the client's certificate")) return false;
-    if (!certificate_.key_file.empty())
-      trust_.use_private_key_file(certificate_.key_file, asio::ssl::context::pem, error);
-    if (settle(error, "use the key of the client's certificate")) return false;
+  Result<void> prepare_tls() {
+    trust_.set_default_verify_paths(error_);
+    if (error_) return cannot("read the trusted certificates");
+    const auto& [file, key_file] = wanted_.certificate;
+    if (!file.empty()) trust_.use_certificate_chain_file(file, error_);
+    if (error_) return cannot("use the client's certificate");
+    if (!key_file.empty()) trust_.use_private_key_file(key_file, asio::ssl::context::pem, error_);
+    if (error_) return cannot("use the key of the client's certificate");
     tls_.emplace(stream_, trust_);
     tls_->set_verify_mode(asio::ssl::verify_peer);
     tls_->set_verify_callback(asio::ssl::host_name_verification(server_.host));
     beast::error_code no_address;
     asio::ip::make_address(server_.host, no_address);
-    if (no_address && SSL_set_tlsext_host_name(tls_->native_handle(), server_.host.c_str()) != 1) {
-      outcome_ = failure("is no name of a host");
-      return false;
-    }
-    return true;
+    if (no_address && SSL_set_tlsext_host_name(tls_->native_handle(), server_.host.c_str()) != 1)
+      return failure("is no name of a host");
+    return {};
   }
 
-  void shake_hands(beast::error_code error) {
-    if (settle(error, "connect", "; is joulecastd running there?")) return;
-    if (!tls_) return send();
-    tls_->async_handshake(asio::ssl::stream_base::client, [this](beast::error_code failed) {
-      if (!settle(failed, "agree on TLS", "; SSL_CERT_FILE names the certificates to trust")) send();
-    });
-  }
-
-  template <class Use>
-  void with_stream(Use use) {
-    if (tls_) return use(*tls_);
-    use(stream_);
-  }
-
-  void send() {
-    with_stream([this](auto& stream) {
-      http::async_write(stream, request_, [this](beast::error_code failed, std::size_t) {
-        if (!settle(failed, "send")) receive();
-      });
-    });
-  }
-
-  void receive() {
-    with_stream([this](auto& stream) {
-      const auto received = [this](beast::error_code failed, std::size_t) {
-        if (!settle(failed, "receive", tls_ ? "" : "; does the port want https?")) finish();
-      };
-      if (status_only_)
-        http::async_read_header(stream, buffer_, parser_, received);
-      else
-        http::async_read(stream, buffer_, parser_, received);
-    });
-  }
-
-  void finish() {
-    auto message = parser_.release();
-    HttpReply reply;
-    reply.status = message.result_int();
-    reply.content_type = std::string(message[http::field::content_type]);
-    reply.link = std::string(message[http::field::link]);
-    reply.body = std::move(message.body());
-    outcome_ = std::move(reply);
+  template <class Stream>
+  Task<Result<HttpReply>> ask(Stream& stream, const http::request<http::string_body>& request) {
+    co_await http::async_write(stream, request, step());
+    if (error_) co_return cannot("send");
+    beast::flat_buffer buffer;
+    http::response_parser<http::string_body> parser;
+    parser.body_limit(body_limit_bytes);
+    if (wanted_.status_only)
+      co_await http::async_read_header(stream, buffer, parser, step());
+    else
+      co_await http::async_read(stream, buffer, parser, step());
+    if (error_) co_return cannot("receive", tls_ ? "" : "; does the port want https?");
     beast::error_code ignored;
     stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    auto message = parser.release();
+    co_return HttpReply{message.result_int(), std::string(message[http::field::content_type]),
+                        std::move(message.body()), std::string(message[http::field::link])};
   }
 
-  ServerAddress server_;
-  http::request<http::string_body> request_;
-  const ClientCertificate certificate_;
-  const bool status_only_;
+  const ServerAddress& server_;
+  const HttpRequest& wanted_;
+  const std::chrono::milliseconds timeout_;
+  beast::error_code error_;  // of the last step
   asio::io_context loop_{1};
-  tcp::resolver resolver_;
   asio::ssl::context trust_{asio::ssl::context::tls_client};
-  beast::tcp_stream stream_;
+  beast::tcp_stream stream_{loop_};
   std::optional<asio::ssl::stream<beast::tcp_stream&>> tls_;  // over stream_, for https
-  beast::flat_buffer buffer_;
-  http::response_parser<http::string_body> parser_;
-  std::chrono::milliseconds timeout_;
-  std::optional<Result<HttpReply>> outcome_;
 };
 
 }  // namespace
@@ -167,7 +142,7 @@ Result<HttpReply> exchange(const ServerAddress& server, const HttpRequest& wante
     request.body() = wanted.json_body;
   }
   request.prepare_payload();
-  return Exchange(server, std::move(request), wanted.certificate, wanted.status_only, timeout).run();
+  return Exchange(server, wanted, timeout).run(request);
 }
 
 }  // namespace joulecast::http_client
