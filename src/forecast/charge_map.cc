@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "planning/root.h"
+
 namespace joulecast::forecast {
 namespace {
 
@@ -60,13 +62,7 @@ double ChargeMap::cutoff_charge(double mean_power_w) const {
     return share(charge, mean_power_w) * circuit_.inner_voltage_v(state) > circuit_.cutoff_voltage_v();
   };
   if (above_cutoff(0)) return 0;
-  double low = 0, high = 1;
-  constexpr int halvings = 20;
-  for (int k = 0; k < halvings; ++k) {
-    const double middle = 0.5 * (low + high);
-    (above_cutoff(middle) ? high : low) = middle;
-  }
-  return high;
+  return 1 - planning::last_that([&](double used) { return above_cutoff(1 - used); }, 0, 1, 20);
 }
 
 double ChargeMap::slope_j(double charge, double mean_power_w) const {

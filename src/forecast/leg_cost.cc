@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "planning/gauss.h"
+#include "planning/root.h"
 
 namespace joulecast::forecast {
 
@@ -81,10 +82,6 @@ Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
   if (kind.unbound && wanted.speed <= most.speed && wanted.acceleration <= most.acceleration) return found;
   if (reaches(kind, wanted.speed, wanted.acceleration)) return found;
   constexpr int halvings = 30;
-  const auto last = [&](double low, double high, const auto& holds) {
-    for (int k = 0; k < halvings; ++k) (holds(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
-    return low;
-  };
   constexpr double creeping = 5e-3;  // of the limits, for any wanted cruise
   const Cruise least{creeping * most.speed, creeping * most.acceleration};
   const auto flow = drive_->flow(instant(kind, least.speed, least.acceleration));
@@ -97,10 +94,11 @@ Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
   double& speed = found.cruise.speed;
   if (!reaches(kind, speed, 0)) {
     constexpr double usable = 0.95;  // of the speed at which no torque for acceleration is left
-    speed = usable * last(std::min(least.speed, speed), speed, [&](double v) { return reaches(kind, v, 0); });
+    speed = usable * planning::last_that([&](double v) { return reaches(kind, v, 0); },
+                                         std::min(least.speed, speed), speed, halvings);
   }
   if (double& a = found.cruise.acceleration; !reaches(kind, speed, a)) {
-    a = last(0, a, [&](double less) { return reaches(kind, speed, less); });
+    a = planning::last_that([&](double less) { return reaches(kind, speed, less); }, 0, a, halvings);
     found.moves = a > 0;
   }
   return found;

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "planning/root.h"
+
 namespace joulecast::forecast {
 namespace {
 
@@ -63,13 +65,7 @@ double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, cons
     return p.probability_below(spend.energy_j, spend.deviation_j) >= confidence;
   };
   if (!(standing_w > 0)) return std::numeric_limits<double>::infinity();
-  double low = 0, high = 1.2 * battery.energy_j(1, 0, standing_w) / standing_w;
-  constexpr int halvings = 16;
-  for (int k = 0; k < halvings; ++k) {
-    const double middle = 0.5 * (low + high);
-    (holds(middle) ? low : high) = middle;
-  }
-  return low;
+  return planning::last_that(holds, 0, 1.2 * battery.energy_j(1, 0, standing_w) / standing_w, 16);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "planning/root.h"
 #include "statistics/distributions.h"
 
 namespace joulecast::forecast {
@@ -65,28 +66,13 @@ double Prediction::at_score(double z) const {
   if (halts.none()) return least;
   z = std::clamp(z, -farthest, farthest);
   const double wanted = normal_probability(z);
-  double low = least, high = least + halts.values().back();
-  // A halt less long than the longest is likelier than not to suffice; regula falsi, Illinois.
-  double at_low = below(low) - wanted, at_high = below(high) - wanted;
-  if (at_low >= 0) return low;
-  if (at_high <= 0) return high;
-  constexpr int most = 40;
+  const auto off = [&](double amount) { return below(amount) - wanted; };
+  // A halt less long than the longest is likelier than not to suffice.
+  const double at_low = off(least), longest = least + halts.values().back(), at_longest = off(longest);
+  if (at_low >= 0) return least;
+  if (at_longest <= 0) return longest;
   constexpr double close = 1e-5;
-  for (int k = 0; k < most && high - low > close * high; ++k) {
-    double middle = (low * at_high - high * at_low) / (at_high - at_low);
-    if (k % 3 == 2) middle = 0.5 * (low + high);
-    const double at = below(middle) - wanted;
-    if (at < 0) {
-      low = middle;
-      at_low = at;
-      at_high *= 0.5;
-    } else {
-      high = middle;
-      at_high = at;
-      at_low *= 0.5;
-    }
-  }
-  return 0.5 * (low + high);
+  return planning::zero_between(off, least, at_low, longest, at_longest, close);
 }
 
 double Prediction::quantile(double probability) const {
