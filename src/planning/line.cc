@@ -149,13 +149,6 @@ double LineProfile::energy_j() const {
          power_.c0 * duration_;
 }
 
-double LineProfile::energy_j(double t) const {
-  const auto [x, v, a] = state(t);
-  // c2 v^2 + c1 a^2 = c1 ((v a)' + B v), since a' = k^2 v - B.
-  const double core = power_.c1 * (v * a - start_ * start_acceleration_ + thrust_ * x);
-  return core + (power_.cx / 2 * (v + start_) + power_.ca) * (v - start_) + power_.c3 * x + power_.c0 * t;
-}
-
 double LineProfile::invariant() const {
   return rate_ * rate_ * start_ * start_ - start_acceleration_ * start_acceleration_ - 2 * thrust_ * start_;
 }
@@ -182,42 +175,6 @@ double LineProfile::transversality_w() const {
 
 double LineProfile::distance_multiplier() const {
   return -power_.c3 - 2 * power_.c1 * thrust_;
-}
-
-LineSample LineProfile::at(double t) const {
-  const auto [x, v, a] = state(t);
-  return {t, x, v, a, power_.power_w(v, a), energy_j(t)};
-}
-
-std::vector<LineSample> LineProfile::sample(std::size_t count) const {
-  assert(count >= 2);
-  std::vector<LineSample> samples;
-  samples.reserve(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    samples.push_back(at(duration_ * static_cast<double>(k) / static_cast<double>(count - 1)));
-  }
-  return samples;
-}
-
-Result<LineProfile> line_in_time(const LineTask& task, double duration_s) {
-  TRY(validate(task));
-  if (!(std::isfinite(duration_s) && duration_s > 0)) {
-    return invalid("duration_s", "is " + std::to_string(duration_s) + ", must be positive and finite");
-  }
-  LineProfile profile(task, duration_s);
-  const double slack = 1e-12 * (task.start_speed + task.end_speed);
-  if (profile.lowest_speed() >= -slack) return profile;
-  // At a mean speed of v0 + vf nothing dips; the longest forward time lies between there and `duration_s`.
-  double low = task.distance / (task.start_speed + task.end_speed), high = duration_s;
-  const auto lowest = [&](double duration) { return LineProfile(task, duration).lowest_speed(); };
-  for (int k = 0; k < 60 && high - low > 1e-9 * high; ++k) {
-    const double middle = 0.5 * (low + high);
-    (lowest(middle) >= 0 ? low : high) = middle;
-  }
-  return fail(Fault::infeasible, "duration_s",
-              "is " + std::to_string(duration_s) +
-                  " s: with these end speeds the closed form would run backwards; the longest is " +
-                  std::to_string(low) + " s");
 }
 
 Result<LineProfile> line_in_free_time(const LineTask& task) {

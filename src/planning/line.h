@@ -1,7 +1,5 @@
 #pragma once
 
-#include <vector>
-
 #include "base/error.h"
 #include "dynamics/straight.h"
 
@@ -23,15 +21,6 @@ struct LineState {
   double acceleration = 0;
 };
 
-struct LineSample {
-  double time_s = 0;
-  double distance = 0;
-  double speed = 0;
-  double acceleration = 0;
-  double power_w = 0;
-  double energy_j = 0;  // since the start
-};
-
 // Thesis (4-9): the extremal v'' = k^2 v - B of minimum energy, with k^2 = c2/c1 and B = -(c3 + lambda1)/(2
 // c1). Written with decaying exponentials only, so that neither long times (k t large) nor vanishing
 // viscosity (k -> 0, where the profile is a parabola) lose digits.
@@ -43,7 +32,6 @@ class LineProfile {
   double duration_s() const { return duration_; }
   double distance() const { return distance_; }
   double energy_j() const;
-  double energy_j(double time_s) const;
   LineState state(double time_s) const;
   double speed(double time_s) const { return state(time_s).speed; }
   double acceleration(double time_s) const { return state(time_s).acceleration; }
@@ -61,10 +49,6 @@ class LineProfile {
   // The multiplier lambda_1 of the distance, thesis (4-9) [W s/x].
   double distance_multiplier() const;
 
-  LineSample at(double time_s) const;
-  // `count` >= 2 samples evenly spaced in time, both ends included.
-  std::vector<LineSample> sample(std::size_t count) const;
-
  private:
   double invariant() const;  // k^2 v^2 - a^2 - 2 B v, constant along the profile
 
@@ -76,10 +60,6 @@ class LineProfile {
   double thrust_;      // B
   double start_acceleration_, end_acceleration_;
 };
-
-// Minimum energy in the given time. Infeasible when it would have to run backwards (end speeds too high for
-// so long a time); the message gives the longest time that does not.
-Result<LineProfile> line_in_time(const LineTask& task, double duration_s);
 
 // Minimum of energy + value of time * duration over profile and duration, by transversality (4-13).
 // Needs c0 + value of time > 0: with time for free, no finite end time is best.

@@ -89,9 +89,6 @@ TEST(Line, EnergyIsIntegratedPower) {
     ASSERT_TRUE(p);
     const double e = quadrature(*p, task.power, p->duration_s());
     EXPECT_NEAR(p->energy_j(), e, 1e-10 * std::fabs(e));
-    EXPECT_NEAR(p->energy_j(p->duration_s()), e, 1e-9 * std::fabs(e));
-    const double part = 0.37 * p->duration_s();
-    EXPECT_NEAR(p->energy_j(part), quadrature(*p, task.power, part), 1e-9 * std::fabs(e));
   }
 }
 
@@ -106,9 +103,9 @@ TEST(Line, OtherTimesCostMore) {
     EXPECT_NEAR(p->transversality_w(), 0, 1e-9 * scale);
     const double best = p->energy_j() + task.value_of_time_w * p->duration_s();
     for (double factor : {0.3, 0.8, 0.99, 1.01, 1.3, 2.0, 4.0, 8.0}) {
-      const auto other = line_in_time(task, factor * p->duration_s());
-      if (!other) continue;  // backwards
-      EXPECT_GT(other->energy_j() + task.value_of_time_w * other->duration_s(), best - 1e-9 * best) << factor;
+      const LineProfile other(task, factor * p->duration_s());
+      if (other.lowest_speed() < 0) continue;
+      EXPECT_GT(other.energy_j() + task.value_of_time_w * other.duration_s(), best - 1e-9 * best) << factor;
     }
     // dE/dT by finite differences is the transversality value.
     const double t = 0.7 * p->duration_s(), h = 1e-4 * t;
@@ -169,8 +166,9 @@ TEST(Line, CruisesOnLongWays) {
   EXPECT_NEAR(p->speed(p->duration_s() / 2), cruise, 1e-9 * cruise);
   EXPECT_NEAR(p->peak_speed(), cruise, 1e-9 * cruise);
   EXPECT_TRUE(std::isfinite(p->energy_j()));
-  for (const LineSample& s : p->sample(101)) {
-    EXPECT_TRUE(std::isfinite(s.speed) && std::isfinite(s.power_w) && std::isfinite(s.energy_j));
+  for (int k = 0; k <= 100; ++k) {
+    const auto [x, v, a] = p->state(0.01 * k * p->duration_s());
+    EXPECT_TRUE(std::isfinite(x) && std::isfinite(v) && std::isfinite(task.power.power_w(v, a)));
   }
 }
 
@@ -189,22 +187,10 @@ TEST(Line, RejectsTasksWithoutAnswer) {
   task.distance = -1;
   EXPECT_EQ(line_in_free_time(task).error().field, "distance");
   task.distance = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(line_in_time(task, 1).error().field, "distance");
+  EXPECT_EQ(line_in_free_time(task).error().field, "distance");
   task.distance = 1;
-  EXPECT_EQ(line_in_time(task, 0).error().field, "duration_s");
   task.power.c0 = 0;
   EXPECT_EQ(line_in_free_time(task).error().field, "value_of_time_w");
-  task.power.c0 = 1;
-  task.start_speed = task.end_speed = 0.5;
-  const auto slow = line_in_time(task, 100);
-  ASSERT_FALSE(slow);
-  EXPECT_EQ(slow.error().fault, Fault::infeasible);
-  // Its advice is feasible and tight: k T is small, so the parabola touches zero at T = 3 D/v.
-  const double advice =
-      std::stod(slow.error().message.substr(slow.error().message.rfind("longest is ") + 11));
-  EXPECT_TRUE(line_in_time(task, advice - 1e-5));
-  EXPECT_FALSE(line_in_time(task, advice + 1e-4));
-  EXPECT_NEAR(advice, 6, 0.3);
 }
 
 // Tables 4-1 and 4-2, optimal column: motors only (no idle power), from rest to rest. Left out, see FACTS:

@@ -7,6 +7,15 @@
 
 namespace joulecast::planning {
 
+struct LineSample {
+  double time_s = 0;
+  double distance = 0;
+  double speed = 0;
+  double acceleration = 0;
+  double power_w = 0;
+  double energy_j = 0;  // since the start
+};
+
 // A speed profile of up to three spans of constant acceleration: the trapezoids and triangles that robots
 // drive without a planner, the baselines of thesis tables 4-1 to 4-4.
 class RampProfile {

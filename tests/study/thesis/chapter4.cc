@@ -156,7 +156,7 @@ Table table_4_4(const robot::RobotModel& nomad) {
     double fast = 0.1, slow = free_s;
     for (int k = 0; k < 60; ++k) {
       const double middle = 0.5 * (fast + slow);
-      (planning::line_in_time(task, middle)->energy_j() > p.in_triangle_time_j ? fast : slow) = middle;
+      (planning::LineProfile(task, middle).energy_j() > p.in_triangle_time_j ? fast : slow) = middle;
     }
     const auto phases = line(nomad, triangle_distance_m(p.peak_m_s, 0, 0), 10.5);
     const std::string what = fmt::format("{:g} m/s", p.peak_m_s);
@@ -168,7 +168,7 @@ Table table_4_4(const robot::RobotModel& nomad) {
              phases.distance, task.distance)});
     table.rows.push_back(
         {what + ", optimal in the triangle's time", p.in_triangle_time_j,
-         planning::line_in_time(task, triangle_s)->energy_j(),
+         planning::LineProfile(task, triangle_s).energy_j(),
          fmt::format("over {:.2f} m in {:.1f} s; the printed value needs {:.1f} s, a mean of {:.2f} m/s, "
                      "above the triangle's peak: the two printed columns are not of one distance",
                      task.distance, triangle_s, fast, task.distance / fast)});
@@ -203,9 +203,9 @@ Result<std::vector<Curve>> figure(const robot::RobotModel& nomad, std::string_vi
     const auto profile = planning::line_in_free_time(task);
     if (!profile) return tl::unexpected(profile.error());
     Curve curve{label, {}, {}};
-    for (const auto& sample : profile->sample(201)) {
-      curve.time_s.push_back(sample.time_s);
-      curve.speed_m_s.push_back(sample.speed);
+    for (int k = 0; k <= 200; ++k) {
+      curve.time_s.push_back(profile->duration_s() * k / 200);
+      curve.speed_m_s.push_back(profile->speed(curve.time_s.back()));
     }
     curves.push_back(std::move(curve));
   }
