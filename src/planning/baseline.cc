@@ -13,9 +13,7 @@ class Ramp {
  public:
   // Appends to the columns of `into` unless that is null; its time and energy are where the run begins.
   Ramp(const DriveLoads& loads, const Run& run, Baseline* into)
-      : loads_(loads), model_(loads.model()), run_(run), uniform_(loads.uniform(run)), into_(into) {
-    at_.payload_kg = run.payload_kg;
-  }
+      : loads_(loads), model_(loads.model()), run_(run), uniform_(loads.uniform(run)), into_(into) {}
 
   void drive(double duration_s, double from, double to) {
     if (!(duration_s > 0)) return;
@@ -91,25 +89,12 @@ class Ramp {
 
   double power_w(double t, double from, double acceleration) {
     const double speed = from + acceleration * t;
-    const Knot knot = run_.at(std::clamp(way_ + (from + 0.5 * acceleration * t) * t, 0.0, run_.length()));
-    const dynamics::Parameters<double>& p = model_.parameters();
-    turn_ = run_.turn != 0 ? run_.turn : knot.curvature_1_m;
-    if (run_.turn != 0) {
-      at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, 0, run_.turn * speed);
-      at_.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, 0, run_.turn * acceleration);
-    } else {
-      at_.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, speed * knot.curvature_1_m);
-      const double bend = run_.at(knot.way).curvature_slope;
-      at_.wheel_acceleration_rad_s2 =
-          dynamics::wheels_of_body(p, acceleration, acceleration * knot.curvature_1_m + bend * speed * speed);
-    }
-    at_.x_m = knot.pose.x_m;
-    at_.y_m = knot.pose.y_m;
-    at_.heading_rad = knot.pose.heading_rad;
-    const auto flow = model_.flow(at_);
-    const double yaw = run_.turn != 0 ? speed : speed * std::fabs(knot.curvature_1_m);
-    peaks.peak_yaw_rate_rad_s = std::max(peaks.peak_yaw_rate_rad_s, yaw);
-    peaks.reach(at_.wheel_speed_rad_s, flow);
+    const Place place = run_.at(std::clamp(way_ + (from + 0.5 * acceleration * t) * t, 0.0, run_.length()));
+    turn_ = run_.turn != 0 ? run_.turn : place.curvature_1_m;
+    const dynamics::Instant at = loads_.instant(run_, place, speed, acceleration);
+    const auto flow = model_.flow(at);
+    peaks.peak_yaw_rate_rad_s = std::max(peaks.peak_yaw_rate_rad_s, std::fabs(turn_) * speed);
+    peaks.reach(at.wheel_speed_rad_s, flow);
     return flow.battery_power_w;
   }
 
@@ -118,7 +103,6 @@ class Ramp {
   const Run& run_;
   bool uniform_;
   Baseline* into_;
-  dynamics::Instant at_;
   double way_ = 0, driven_s_ = 0;
   double turn_ = 0;  // heading per unit of the run's coordinate, at the last evaluation of power
 };

@@ -43,10 +43,6 @@ std::pair<std::size_t, std::array<double, 4>> place(double at, std::size_t count
   return {first, cubic(at - static_cast<double>(first) - 1)};
 }
 
-LegCost scaled(const LegCost& cost, double by) {
-  return {by * cost.energy_j, by * cost.duration_s};
-}
-
 }  // namespace
 
 struct CostTable::Kind {
@@ -162,7 +158,7 @@ LegCost interpolated(const Members& members, double log_length, std::size_t& nea
     for (std::size_t j = first; j < first + 4; ++j)
       if (j != i)
         weight *= (log_length - members[j].log_length) / (members[i].log_length - members[j].log_length);
-    sum += scaled(members[i].cost, weight);
+    sum += weight * members[i].cost;
   }
   return sum;
 }
@@ -179,7 +175,7 @@ CostTable::Row CostTable::Grid::row_of(const Walk& walk, double per_decade) cons
   const auto beyond = [&](double length) {
     const Member& last = walk.members.back();
     Member m(length, last.cost);
-    m.cost += scaled(walk.per_length, length - last.length);
+    m.cost += (length - last.length) * walk.per_length;
     return m;
   };
   // A robot so slow that it cruises on the shortest way already.
@@ -193,8 +189,7 @@ CostTable::Row CostTable::Grid::row_of(const Walk& walk, double per_decade) cons
   row.per_log = (count - 1) / logs;
   std::size_t near = 0;
   for (double k = 0; k < count; ++k) {
-    const LegCost unit = interpolated(members, log_shortest_ + k / row.per_log, near);
-    row.nodes.push_back({unit.energy_j, unit.duration_s});
+    row.nodes.push_back(interpolated(members, log_shortest_ + k / row.per_log, near));
   }
   return row;
 }
@@ -216,7 +211,7 @@ double CostTable::Grid::error_against(Kind& kind, double per_decade) const {
     const Member& last = walk->members.back();
     for (const double beyond : {0.1, 0.5, 3.0}) {
       LegCost cost = last.cost;
-      cost += scaled(walk->per_length, beyond * last.length);
+      cost += beyond * last.length * walk->per_length;
       compare((1 + beyond) * last.length, payload_kg, cost);
     }
   }
@@ -267,20 +262,15 @@ void CostTable::Grid::build(Kind& kind, double payload_limit_kg, CostTable& tabl
 
 LegCost CostTable::Grid::along(const Row& row, double length, double log_length) const {
   if (length >= row.knee) {
-    const double more = length - row.knee;
-    return {row.at_knee.energy_j + more * row.per_length.energy_j,
-            row.at_knee.duration_s + more * row.per_length.duration_s};
+    LegCost cost = row.at_knee;
+    return cost += (length - row.knee) * row.per_length;
   }
   const auto [first, weight] =
       place(std::max(0.0, (log_length - log_shortest_) * row.per_log), row.nodes.size());
-  Row::Node sum;
-  for (std::size_t i = 0; i < 4; ++i) {
-    sum.energy_per_length += weight[i] * row.nodes[first + i].energy_per_length;
-    sum.duration_per_length += weight[i] * row.nodes[first + i].duration_per_length;
-  }
+  LegCost unit;
+  for (std::size_t i = 0; i < 4; ++i) unit += weight[i] * row.nodes[first + i];
   // Below the first node distance and time are those of a motion without speed worth mentioning: as its root.
-  const double scale = length < shortest_ ? std::sqrt(length * shortest_) : length;
-  return {sum.energy_per_length * scale, sum.duration_per_length * scale};
+  return (length < shortest_ ? std::sqrt(length * shortest_) : length) * unit;
 }
 
 // Rows are interpolated at equal fractions of their knees, as fractions of the cost there. The knee is a kink
@@ -294,14 +284,14 @@ LegCost CostTable::Grid::at(double length, double payload_kg) const {
       place(payload_kg / payload_limit_kg_ * static_cast<double>(rows_.size() - 1), rows_.size());
   LegCost sum;
   if (!knees_within_) {
-    for (std::size_t i = 0; i < 4; ++i) sum += scaled(along(rows_[first + i], length, log_length), share[i]);
+    for (std::size_t i = 0; i < 4; ++i) sum += share[i] * along(rows_[first + i], length, log_length);
     return sum;
   }
   double knee = 0;
   LegCost at_knee;
   for (std::size_t i = 0; i < 4; ++i) {
     knee += share[i] * rows_[first + i].knee;
-    at_knee += scaled(rows_[first + i].at_knee, share[i]);
+    at_knee += share[i] * rows_[first + i].at_knee;
   }
   const double of_knee = length / knee;
   const double log_of_knee = std::log(of_knee);

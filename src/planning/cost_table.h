@@ -26,6 +26,9 @@ struct LegCost {
     energy_j += b.energy_j, duration_s += b.duration_s;
     return *this;
   }
+  friend LegCost operator*(double by, const LegCost& cost) {
+    return {by * cost.energy_j, by * cost.duration_s};
+  }
 };
 
 // The way in which legs are driven; a table belongs to one robot model and one of these.
@@ -77,12 +80,9 @@ class CostTable {
  private:
   // One payload. Beyond a knee, where a motion reaches its cruising speed, cost is linear in the length.
   struct Row {
-    struct Node {
-      double energy_per_length = 0, duration_per_length = 0;
-    };
     double knee = 0, log_knee = 0, per_log = 1;
     LegCost at_knee, per_length;  // cost there, and per unit of additional length
-    std::vector<Node> nodes;      // from the shortest length to the knee
+    std::vector<LegCost> nodes;   // per unit of length, from the shortest length to the knee
   };
   // One motion of a payload: its length and its cost.
   struct Member {

@@ -47,16 +47,13 @@ class Request {
     if (!(l.least_speed_m_s >= 0 && l.least_speed_m_s < l.speed_m_s))
       return fail(Fault::infeasible, "limits/least_speed_m_s",
                   fmt::format("is {}, limits/speed_m_s allows {}", l.least_speed_m_s, l.speed_m_s));
-    if (!(std::isfinite(problem.value_of_time_w) && problem.value_of_time_w >= 0)) {
-      return invalid("value_of_time_w", "must not be negative");
-    }
-    if (!(loads.electric().idle_w + problem.value_of_time_w >= 0)) {
-      return invalid("value_of_time_w", "plus the idle power must not be negative");
-    }
-    for (auto [name, value] :
-         {std::pair{"start_speed_m_s", problem.start_speed_m_s}, {"end_speed_m_s", problem.end_speed_m_s}}) {
+    for (auto [name, value] : {std::pair{"value_of_time_w", problem.value_of_time_w},
+                               {"start_speed_m_s", problem.start_speed_m_s},
+                               {"end_speed_m_s", problem.end_speed_m_s}}) {
       if (!(std::isfinite(value) && value >= 0)) return invalid(name, "must not be negative");
     }
+    if (!(loads.electric().idle_w + problem.value_of_time_w >= 0))
+      return invalid("value_of_time_w", "plus the idle power must not be negative");
     if (problem.deadline_s && !(std::isfinite(*problem.deadline_s) && *problem.deadline_s > 0)) {
       return invalid("deadline_s", "must be positive");
     }

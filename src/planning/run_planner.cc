@@ -85,12 +85,17 @@ std::string number(double x) {
   return std::to_string(x);
 }
 
-// Power of a robot at standstill that must overcome its friction [W].
+// Torque of a wheel at standstill that must overcome its friction.
+double standing_torque_nm(const CellLoad& load) {
+  const WheelLoad w = load.whole();
+  return std::fabs(w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck);
+}
+
+// Power of a robot likewise [W].
 double standing_power_w(const SpeedGrid& grid) {
   double sum = grid.electric.idle_w;
   for (const std::size_t s : {0u, 1u}) {
-    const WheelLoad w = grid.load(0)[s].whole();
-    const double torque = w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck;
+    const double torque = standing_torque_nm(grid.load(0)[s]);
     sum += grid.electric.copper_w_n2_m2[s] * torque * torque;
   }
   return sum;
@@ -107,35 +112,26 @@ tl::unexpected<Error> stopped() {
   return fail(Fault::stopped, "", "the answer is no longer wanted");
 }
 
-// The squared speed that speed, yaw rate and wheel speed limits allow.
-double RunPlanner::ceiling_at(double way) const {
+// The squared speed that speed, yaw rate and wheel speed limits allow, and which of them bounds it.
+RunPlanner::Ceiling RunPlanner::ceiling(double way) const {
   const Limits& l = problem_->limits;
   const auto& p = loads_->model().parameters();
   const double turn = run_->turn == 0 ? std::fabs(run_->at(way).curvature_1_m) : 1;
+  const auto pace = dynamics::wheels_of_body(p, run_->turn == 0 ? 1 : 0, turn);
+  const double fastest = std::max(std::fabs(pace[0]), std::fabs(pace[1]));
   double v = run_->turn == 0 ? l.speed_m_s : unlimited;
-  if (turn > 0) v = std::min(v, l.yaw_rate_rad_s / turn);
-  if (std::isfinite(l.wheel_speed_rad_s)) {
-    const auto pace = dynamics::wheels_of_body(p, run_->turn == 0 ? 1 : 0, turn);
-    v = std::min(v, l.wheel_speed_rad_s / std::max(std::fabs(pace[0]), std::fabs(pace[1])));
-  }
+  Bound bound = Bound::speed;
+  if (const double by_yaw = l.yaw_rate_rad_s / turn; by_yaw < v) v = by_yaw, bound = Bound::yaw_rate;
+  if (const double by_wheel = l.wheel_speed_rad_s / fastest; by_wheel < v)
+    v = by_wheel, bound = Bound::wheel_speed;
   if (!std::isfinite(v)) {
     // The grid needs a bound: no motor turns faster than its voltage allows, here at most four times the
     // battery's.
-    const auto pace = dynamics::wheels_of_body(p, run_->turn == 0 ? 1 : 0, turn);
     const double volts =
         std::isfinite(l.voltage_v) ? l.voltage_v : 4 * std::max(24.0, robot_->battery.nominal_voltage_v);
-    v = volts / (p.voltage_constant_v_s_rad * std::max(std::fabs(pace[0]), std::fabs(pace[1])));
+    v = volts / (p.voltage_constant_v_s_rad * fastest), bound = Bound::wheel_speed;
   }
-  return v * v;
-}
-
-Bound RunPlanner::ceiling_bound(double way) const {
-  const Limits& l = problem_->limits;
-  const double turn = run_->turn == 0 ? std::fabs(run_->at(way).curvature_1_m) : 1;
-  const double v = std::sqrt(ceiling_at(way));
-  if (run_->turn == 0 && v >= l.speed_m_s * (1 - 1e-9)) return Bound::speed;
-  if (turn * v >= l.yaw_rate_rad_s * (1 - 1e-9)) return Bound::yaw_rate;
-  return Bound::wheel_speed;
+  return {v * v, bound};
 }
 
 double RunPlanner::acceleration_limit() const {
@@ -227,7 +223,7 @@ RunAnswer RunPlanner::answer_of(SteppedMotion motion) const {
   answer.binding = motion.binding;
   constexpr auto speed = static_cast<std::size_t>(Bound::speed);
   if (std::exchange(answer.binding[speed], false))
-    answer.binding[static_cast<std::size_t>(ceiling_bound(0))] = true;
+    answer.binding[static_cast<std::size_t>(ceiling(0).bound)] = true;
   return answer;
 }
 
@@ -309,8 +305,7 @@ Result<void> RunPlanner::check_feasible() const {
   }
   for (std::size_t k = 0; k < grid.cells(); ++k) {
     for (std::size_t s : {0u, 1u}) {
-      const WheelLoad w = grid.load(k)[s].whole();
-      const double standing = std::fabs(w.t0 + w.gear * std::fabs(w.t0) + w.f0 + w.stribeck);
+      const double standing = standing_torque_nm(grid.load(k)[s]);
       if (standing >= grid.torque_limit_nm) {
         return fail(Fault::infeasible, "limits/current_a",
                     "is " + number(problem_->limits.current_a) + ", friction and slope alone need " +
@@ -336,7 +331,7 @@ Result<void> RunPlanner::check_feasible() const {
     return fail(
         Fault::infeasible, "limits/least_speed_m_s",
         fmt::format("is {:.4g}, {} at most {:.4g} {:.4g} m along the way", problem_->limits.least_speed_m_s,
-                    bound ? fmt::format("{} allows", name_of(ceiling_bound(bend)))
+                    bound ? fmt::format("{} allows", name_of(ceiling(bend).bound))
                           : std::string("the other limits allow"),
                     std::sqrt(bound ? *lowest : fast), bound ? bend : where));
   }
@@ -381,13 +376,13 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
   const double smallest = 1e-6 * length, count = static_cast<double>(cells);
   const double most_m = length / count, most_1_m = 20 / count, most_1_m2 = 3.2 / count, most_log = 4 / count;
   nodes.push_back(0);
-  double share = 0, slope = 0, ceiling = ceiling_at(0);  // share of a cell since the last node
+  double share = 0, slope = 0, square = ceiling_at(0);  // share of a cell since the last node
   for (std::size_t k = 1; k < run_->knots.size(); ++k) {
     const Knot &a = run_->knots[k - 1], &b = run_->knots[k];
     const double gap = b.way - a.way, bend = b.curvature_1_m - a.curvature_1_m;
-    const double before = std::exchange(ceiling, ceiling_at(b.way));
+    const double before = std::exchange(square, ceiling_at(b.way));
     const double here =
-        gap / most_m + std::fabs(bend) / most_1_m + std::fabs(std::log(ceiling / before)) / most_log;
+        gap / most_m + std::fabs(bend) / most_1_m + std::fabs(std::log(square / before)) / most_log;
     share += here + std::fabs(bend / gap - slope) / most_1_m2;
     slope = bend / gap;
     if (share > 1 && a.way > nodes.back()) nodes.push_back(a.way), share = here;
@@ -646,8 +641,8 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   LineTask task = *line_;
   task.distance = length;
   task.value_of_time_w = price_w;
-  const double ceiling = std::sqrt(ceiling_at(0));
-  const auto line = line_within(task, ceiling, acceleration_limit());
+  const Ceiling highest = ceiling(0);
+  const auto line = line_within(task, std::sqrt(highest.square), acceleration_limit());
   if (!line) return {};
   const double top = line->peak_speed(), most = line->peak_acceleration();
   const bool lossy = e.up != e.down;
@@ -665,7 +660,8 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   answer.duration_s = line->duration_s();
   answer.residual = line->residual_w() / (task.power.c0 + price_w);
   answer.binding[static_cast<std::size_t>(Bound::acceleration)] = line->holds_acceleration();
-  if (top >= ceiling * (1 - 1e-9)) answer.binding[static_cast<std::size_t>(ceiling_bound(0))] = true;
+  if (top >= std::sqrt(highest.square) * (1 - 1e-9))
+    answer.binding[static_cast<std::size_t>(highest.bound)] = true;
   answer.peak_speed = top;
   answer.line = std::make_unique<LineMotion>(*line);
   return answer;
@@ -895,8 +891,8 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double
     // Determine which of the limits behind the ceiling is binding, where the profile is closest to it.
     answer.binding[static_cast<std::size_t>(Bound::speed)] = false;
     for (std::size_t k = 1; k + 1 < nodes.size(); ++k) {
-      if (s.z[k] > (1 - 2e-3) * ceiling_at(nodes[k]))
-        answer.binding[static_cast<std::size_t>(ceiling_bound(nodes[k]))] = true;
+      if (const Ceiling here = ceiling(nodes[k]); s.z[k] > (1 - 2e-3) * here.square)
+        answer.binding[static_cast<std::size_t>(here.bound)] = true;
     }
   }
   return answer;

@@ -77,8 +77,12 @@ class RunPlanner {
   RunPlanner(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run, const Problem& problem)
       : robot_(&robot), loads_(&loads), run_(&run), problem_(&problem) {}
 
-  double ceiling_at(double way) const;
-  Bound ceiling_bound(double way) const;
+  struct Ceiling {
+    double square = 0;  // of the speed
+    Bound bound = Bound::speed;
+  };
+  Ceiling ceiling(double way) const;
+  double ceiling_at(double way) const { return ceiling(way).square; }
   double voltage_limit_v() const;
   void find_line();
   void find_motion();
