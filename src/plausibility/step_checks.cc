@@ -92,7 +92,7 @@ std::map<std::string, Series> series_of(const CheckContext& c) {
       series.mission.push_back(m);
       series.level.push_back(e.ratio.value);
       for (const auto& [reading, power] : e.powers)
-        if (power > 0) series.channel = reading_names[reading];
+        if (power > 0 && reading < reading_count) series.channel = reading_names[reading];
     }
   }
   return all;

@@ -305,16 +305,26 @@ TEST(CheckRecordings, SplitsRecordingsAtStep) {
 }
 
 // A robot with battery power and wheel speeds alone.
-made::Robot with_power_alone() {
-  made::Robot robot = made::virtual_robot("amr", 21, [](vr::SimulationSpec& spec) {
+made::Robot with_power_alone(int missions = 3) {
+  made::Robot robot = made::virtual_robot("amr", 21, [&](vr::SimulationSpec& spec) {
     spec.sensors.motor_channels = false;
-    spec.missions = 3;
+    spec.missions = missions;
   });
   alter::fill(robot.recordings,
               {reading::yaw_rate, reading::x, reading::y, reading::heading, reading::command_speed,
                reading::command_turn},
               signals::unmeasured);
   return robot;
+}
+
+TEST(CheckRecordings, FindsStepByPowerAlone) {
+  made::Robot robot = with_power_alone(8);
+  alter::step(robot.recordings, {reading::battery_current}, 1.25);
+  const auto checks = check_recordings(robot.recordings, robot.model);
+  const Check* step = find(checks, "step_between_missions");
+  ASSERT_TRUE(step);
+  EXPECT_EQ(step->first_mission, 4u);
+  EXPECT_TRUE(step->channel.starts_with("battery_")) << step->channel;
 }
 
 TEST(CheckRecordings, NamesUnitsByPowerAlone) {
