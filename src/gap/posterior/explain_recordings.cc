@@ -411,8 +411,7 @@ class Explainer {
     // A smaller part than that of named effects is only mentioned.
     const bool smaller = h.function_file - h.function_effects > h.function_effects - h.function_all;
     if (smaller && surest() >= named) return false;
-    more_repeats(h.repeats_left);
-    return true;
+    return !more_repeats(h.repeats_left);
   }
 
   bool more_repeats(double left) {
