@@ -2198,7 +2198,11 @@ await check('500 live robots stay live on the page', async () => {
   await watched.locator('.fleet tbody th a').first().waitFor();
   const first = watched.locator('.fleet tbody tr').first().locator('td.power .number');
   const powers = new Set();
-  await until('four powers of the first robot', async () => powers.add(await first.textContent()).size >= 4, 60);
+  await until(
+    'four powers of the first robot',
+    async () => powers.add(await first.textContent()).size >= 4,
+    60,
+  );
   equal(await watched.locator('.link').textContent(), 'Live', 'the link');
   const { missions } = await get('/v1/missions?state=finished&limit=1');
   expect(
