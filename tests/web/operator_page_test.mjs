@@ -101,7 +101,7 @@ async function openingsMs(url, there, limitMs = Infinity) {
         String(there),
       ),
     );
-    await fresh.context().close();
+    await close(fresh);
   }
   return times.sort((a, b) => a - b).map(Math.round);
 }
@@ -237,6 +237,11 @@ async function openPage(options = {}) {
   page.on('pageerror', (error) => faults.push(error.stack));
   return page;
 }
+// Requests of the page that are on their way to a handler of the test are no longer wanted.
+async function close(page) {
+  await page.unrouteAll({ behavior: 'ignoreErrors' });
+  await page.context().close();
+}
 // Presses a button with a confirmation dialog, and confirms.
 async function adopt(page, label, action = label) {
   await page.getByRole('button', { name: label, exact: true }).first().click();
@@ -332,7 +337,7 @@ await check('charts of live values are filled on opening', async () => {
     const shown = () => fresh.locator(trace).first().evaluate(filled);
     await until(`a filled chart at ${hash}`, async () => (await shown()) > 0.6 * available, 5);
     expect(Date.now() - began < 5000, `${hash} was filled after ${Date.now() - began} ms`);
-    await fresh.context().close();
+    await close(fresh);
   }
 });
 
@@ -467,7 +472,7 @@ await check('robots at rest, silent or restarted are marked', async () => {
   expect(standing[6].startsWith('0.00') && standing[8] === 'idle', `a standing robot: ${standing}`);
   await fresh.getByRole('button', { name: 'Need attention', exact: true }).click();
   await until('that robot alone', async () => (await fresh.locator('.fleet tbody th a').count()) === 1);
-  await fresh.context().close();
+  await close(fresh);
   faultsWanted = false;
 });
 
@@ -842,7 +847,7 @@ await check('only a daemon in a cluster shows it', async () => {
   await until('a lag of a minute', async () => /min|5\d/.test(await lag()), 30);
   answer = inCluster({ error: 'connection refused' });
   await fresh.getByText('anna does not reach the database').waitFor();
-  await fresh.context().close();
+  await close(fresh);
 });
 
 await check('trends offer the robots with missions', async () => {
@@ -1245,7 +1250,7 @@ await check('waiting and faults are shown and retried', async () => {
   await fresh.unroute('**/v1/missions?*');
   await fresh.getByRole('button', { name: 'Try again' }).click();
   await fresh.locator('.missions tbody tr').first().waitFor();
-  await fresh.context().close();
+  await close(fresh);
   faultsWanted = false;
 });
 
@@ -1285,7 +1290,7 @@ await check('other views are loaded on demand and report failures', async () => 
   await fresh.getByRole('link', { name: 'Gap', exact: true }).click();
   await fresh.getByText('This part of the page could not be loaded').waitFor();
   await fresh.screenshot({ path: path.join(given.out, 'screenshots', 'gap-not-loaded-laptop.png') });
-  await fresh.context().close();
+  await close(fresh);
   faultsWanted = false;
 });
 
@@ -1689,7 +1694,7 @@ await check('robots are cards on a phone without clipping', async () => {
     .locator('.readouts .readout')
     .evaluateAll((all) => new Set(all.map((one) => one.offsetLeft)).size);
   equal(columns, 2, 'columns of figures');
-  await phone.context().close();
+  await close(phone);
 });
 
 const markedRobot = 'oval-01';
@@ -1767,7 +1772,7 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
   });
 }
 // Also the pages of failed checks: an open page sends requests.
-for (const shown of leftOpen) await shown.context().close();
+for (const shown of leftOpen) await close(shown);
 
 // A PNG of one grey.
 function greyPng(width, height, grey) {
@@ -1930,7 +1935,7 @@ await check('energy charged, cost and emissions are shown', async () => {
     'the loss',
   );
   await readout('Emissions').getByText('CO₂').waitFor();
-  await shown.context().close();
+  await close(shown);
 });
 
 await check('the map shows robots on the plan of their level', async () => {
@@ -2049,7 +2054,7 @@ async function openEachView() {
         equal(serious.map((v) => `${v.id}: ${places(v)}`).join('; '), '', 'axe');
       });
     }
-    await shown.context().close();
+    await close(shown);
   }
 }
 await Promise.all([openEachView(), openEachView()]);
@@ -2088,7 +2093,7 @@ await check('a lost service is reported and recovered', async () => {
   faultsWanted = false;
 });
 
-await page.context().close();
+await close(page);
 await stop(fleet);
 await stop(daemon);
 
@@ -2131,7 +2136,7 @@ await check('500 live robots keep the page responsive', async () => {
       (await busy.locator('.fleet tbody tr[aria-rowindex]').first().getAttribute('aria-rowindex')) > 100,
   );
   await busy.screenshot({ path: path.join(given.out, 'screenshots', 'fleet-500-laptop.png') });
-  await busy.context().close();
+  await close(busy);
   expect(
     figures.main_thread_share_500_robots < 0.5,
     `main thread busy ${figures.main_thread_share_500_robots}`,
@@ -2214,7 +2219,7 @@ await check('500 live robots stay live on the page', async () => {
   await watched.getByRole('button', { name: 'Load more' }).click();
   await watched.getByText('100 of').waitFor();
   await watched.screenshot({ path: path.join(given.out, 'screenshots', 'missions-100000-laptop.png') });
-  await watched.context().close();
+  await close(watched);
 });
 await stop(plenty);
 await stop(daemon);
