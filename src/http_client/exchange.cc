@@ -39,7 +39,8 @@ class Exchange {
 
   Result<HttpReply> run(const http::request<http::string_body>& request) {
     Result<HttpReply> outcome = failure("no answer within the timeout");
-    asio::co_spawn(loop_, talk(request), [&outcome](const std::exception_ptr&, Result<HttpReply> reply) {
+    asio::co_spawn(loop_, talk(request), [&outcome](std::exception_ptr thrown, Result<HttpReply> reply) {
+      if (thrown) std::rethrow_exception(std::move(thrown));
       outcome = std::move(reply);
     });
     loop_.run_for(timeout_ + std::chrono::milliseconds(200));
