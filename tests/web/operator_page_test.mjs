@@ -314,9 +314,8 @@ await check('charts of live values are filled on opening', async () => {
   // Share of the width over which the measured power is drawn, in its colour.
   const filled = (chart) => {
     const trace = chart.querySelector('.measured');
-    const colour = getComputedStyle(document.documentElement).getPropertyValue('--measured').trim();
-    const [r, g, b] = [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16));
-    if (getComputedStyle(trace).stroke !== `rgb(${r}, ${g}, ${b})`) return 0;
+    const measured = getComputedStyle(document.querySelector('.mark path')).stroke;
+    if (getComputedStyle(trace).stroke !== measured) return 0;
     let drawn = 0;
     let at = 0;
     for (const [, kind, x] of (trace.getAttribute('d') ?? '').matchAll(/([ML])(-?[\d.]+) -?[\d.]+/g)) {
@@ -2062,9 +2061,13 @@ await Promise.all([openEachView(), openEachView()]);
 await check('the chosen theme is kept', async () => {
   await go(page, '#/fleet');
   await page.getByRole('button', { name: 'Dark theme' }).click();
-  equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark', 'theme');
+  equal(await page.evaluate(() => document.documentElement.style.colorScheme), 'dark', 'theme');
   await page.reload();
-  equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark', 'theme after a reload');
+  equal(
+    await page.evaluate(() => document.documentElement.style.colorScheme),
+    'dark',
+    'theme after a reload',
+  );
 });
 
 await check('a mission of one hour at 50 Hz opens about as fast as a short one', async () => {

@@ -2,10 +2,11 @@ import { keptChoice } from './choice.js';
 
 const systemDark = matchMedia('(prefers-color-scheme: dark)');
 const choice = keptChoice('theme', ['light', 'dark'], () => (systemDark.matches ? 'dark' : 'light'));
+const { style } = document.documentElement;
 let colours = null;
 
 function show(theme) {
-  document.documentElement.dataset.theme = theme;
+  style.colorScheme = theme;
   colours = null;
 }
 
@@ -16,14 +17,15 @@ export const useTheme = () => choice.use() === 'dark';
 const names = ['ink', 'muted', 'line', 'graticule', 'screen', 'page'];
 names.push('measured', 'modelled', 'gap', 'good', 'bad', 'accent');
 
-// Colours of the style sheet, for drawing on a canvas.
-export function palette() {
-  if (colours === null) {
-    const style = getComputedStyle(document.documentElement);
-    colours = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
-  }
-  return colours;
+function colourOf(name) {
+  style.color = `var(--${name})`;
+  const { color } = getComputedStyle(document.documentElement);
+  style.color = '';
+  return color;
 }
+
+// Colours of the style sheet, for drawing on a canvas.
+export const palette = () => (colours ??= Object.fromEntries(names.map((name) => [name, colourOf(name)])));
 
 choice.listen(show); // before any component's, so that they find the new colours
 systemDark.addEventListener('change', choice.tell);
