@@ -15,6 +15,20 @@ const limits = {
   charts: [['uplot.js'], 24_000],
 };
 
+// The sections of help.md: a list of terms, [term, address of its view, words], or a paragraph.
+const oneLine = (lines) => lines.replaceAll(/\s+/g, ' ').trim();
+const term = /^- \[?\*\*(.+?)\*\*(?:\]\((.+?)\))?: (.+(?:\n {2}.+)*)$/gm;
+function sectionOf(section) {
+  const [title, lines] = section.split(/\n(.*)/s);
+  const terms = [...lines.matchAll(term)].map(([, name, to, words]) => [name, to, oneLine(words)]);
+  return { title, terms, text: terms.length === 0 ? oneLine(lines) : '' };
+}
+async function readHelp({ path: file }) {
+  const text = await readFile(file, 'utf8');
+  return { contents: JSON.stringify(text.split(/^#+ /m).slice(1).map(sectionOf)), loader: 'json' };
+}
+const help = { name: 'help', setup: (b) => b.onLoad({ filter: /help\.md$/ }, readHelp) };
+
 const options = {
   absWorkingDir: here,
   entryPoints: [
@@ -34,7 +48,7 @@ const options = {
   charset: 'utf8',
   jsx: 'automatic',
   jsxImportSource: 'preact',
-  loader: { '.md': 'text' },
+  plugins: [help],
   banner: { js: '/* joulecast operator page, built from source/; licences: third_party.txt */' },
   legalComments: 'none',
   write: false,
@@ -107,7 +121,7 @@ if (mode === '--check') {
   console.log('the built page is what the sources give');
 } else if (mode === '--watch') {
   const rebuild = { name: 'put', setup: (b) => b.onEnd(async () => put(await products())) };
-  await (await context({ ...options, plugins: [rebuild] })).watch();
+  await (await context({ ...options, plugins: [help, rebuild] })).watch();
 } else {
   await put(await products());
 }
