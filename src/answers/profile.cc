@@ -1,5 +1,7 @@
 #include "answers/profile.h"
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -9,16 +11,34 @@
 namespace joulecast::answers {
 namespace {
 
+// Whether the baseline keeps the limits; otherwise, if columns are requested, the same motion in the least of
+// some multiples of its time with which it does.
 std::optional<ProfileOutput::Baseline> baseline(const planning::Planner& planner, const ProfileInput& input,
                                                 const planning::Path& path, const planning::Plan& plan,
                                                 double ramp_fraction) {
   const planning::Problem& problem = input.drive.problem;
-  auto motion = planning::ramp_baseline(planner.loads(), path, plan.run_duration_s, problem.start_speed_m_s,
-                                        problem.end_speed_m_s, ramp_fraction, input.baseline_columns);
+  const planning::Limits& limits = problem.limits;
+  const auto driven = [&](double multiple, bool columns) {
+    auto durations = plan.run_duration_s;
+    for (double& duration_s : durations) duration_s *= multiple;
+    return planning::ramp_baseline(planner.loads(), path, durations, problem.start_speed_m_s,
+                                   problem.end_speed_m_s, ramp_fraction, columns);
+  };
+  auto motion = driven(1, input.baseline_columns);
   if (!motion) return std::nullopt;
-  const bool within = motion->beyond(problem.limits).empty();
-  const double saving = 1 - plan.summary.energy_j / motion->energy_j;
-  return ProfileOutput::Baseline{std::move(*motion), within, saving};
+  ProfileOutput::Baseline baseline;
+  baseline.within_limits = motion->beyond(limits).empty();
+  baseline.saving_fraction = 1 - plan.summary.energy_j / motion->energy_j;
+  const double least = std::max({1.0, motion->peak_speed_m_s / limits.speed_m_s,
+                                 motion->peak_yaw_rate_rad_s / limits.yaw_rate_rad_s,
+                                 std::sqrt(motion->peak_acceleration_m_s2 / limits.acceleration_m_s2)});
+  for (const double more : {1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2.0}) {
+    if (baseline.within_limits || baseline.slowed || !input.baseline_columns) break;
+    const auto slower = driven(least * more, false);
+    if (slower && slower->beyond(limits).empty()) baseline.slowed = *slower;
+  }
+  baseline.motion = std::move(*motion);
+  return baseline;
 }
 
 Result<ProfileOutput> compared(const planning::Planner& planner, const ProfileInput& input,
@@ -147,6 +167,9 @@ const Table<ProfileAnswer>& baselines_table() {
           .column("yaw_rate_rad_s", &Baseline::yaw_rate_rad_s, "rate of turning, positive to the left")
           .all_digits("power_w", &Baseline::power_w, "power drawn from the battery", false)
           .all_digits("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", false);
+  static const auto slowed = Table<Baseline>()
+                                 .value("energy_j", &Baseline::energy_j, drawn_words)
+                                 .value("duration_s", &Baseline::duration_s, "from start to end");
   static const auto baseline =
       Table<BaselineAnswer>()
           .value("energy_j", AT(baseline.motion.energy_j), drawn_words)
@@ -157,6 +180,12 @@ const Table<ProfileAnswer>& baselines_table() {
                  "relative energy saving of the optimum compared with it")
           .object("profile", AT(baseline.motion), "its motion over time, if baseline_columns is requested",
                   motion)
+          .only(AT(columns))
+          .object(
+              "slowed", AT(baseline.slowed),
+              "if baseline_columns is requested and it exceeds the limits: the same motion in a longer time "
+              "in which it keeps them; null: none",
+              slowed)
           .only(AT(columns));
   const auto shape = [](std::optional<ProfileOutput::Baseline> ProfileOutput::*member) {
     return [member](const A& a) -> std::optional<BaselineAnswer> {

@@ -29,6 +29,7 @@ struct ProfileOutput {
     planning::Baseline motion;
     bool within_limits = true;
     double saving_fraction = 0;  // of its energy, by the plan
+    std::optional<planning::Baseline> slowed;
   };
   planning::Plan plan;
   std::optional<Baseline> trapezoid, triangle;  // as long on every run; absent where a run is too short

@@ -99,6 +99,20 @@ TEST(Profile, ColumnsEndAtTheirTotals) {
   EXPECT_EQ(placed["profile"]["x_m"][0], 1);
 }
 
+TEST(Profile, SlowsBaselinesToTheLimits) {
+  json request = {{"path", {{{"kind", "straight"}, {"length_m", 8}}}}, {"baseline_columns", true}};
+  const double shortest = answer(profile_answer, request)["certificate"]["shortest_time_s"];
+  request["deadline_s"] = 1.05 * shortest;
+  const json triangle = answer(profile_answer, request)["baselines"]["triangle"];
+  EXPECT_FALSE(triangle["within_limits"]);
+  const double multiple =
+      triangle["slowed"]["duration_s"].get<double>() / triangle["duration_s"].get<double>();
+  const double speed = triangle["peak_speed_m_s"].get<double>() / multiple;
+  EXPECT_NEAR(speed, testing::nomad().limits.speed_m_s / 1.001, 1e-6);
+  request["deadline_s"] = 5 * shortest;
+  EXPECT_TRUE(answer(profile_answer, request)["baselines"]["triangle"]["slowed"].is_null());
+}
+
 TEST(Estimate, ReportsBrokenLimits) {
   const robot::RobotModel nomad = testing::nomad();
   const auto broken = [](const json& motion) {

@@ -84,7 +84,7 @@ async function readPlan(asked, signal) {
   return { asked, request, answer: await post(`${robotPath(asked.robot)}/profile`, request, signal) };
 }
 
-// {answer, request, asked, error, busy, autonomy, compute}; `asked` contains the parameters of the answer.
+// {answer, asked, error, busy, autonomy, compute}; `asked` contains the parameters of the answer.
 function usePlan() {
   const live = useLive();
   const [wanted, compute] = useState(null);
@@ -99,7 +99,6 @@ function usePlan() {
   const current = autonomy.path === key && autonomy;
   return {
     answer: answer ?? null,
-    request,
     asked,
     error,
     busy: loading,
@@ -120,7 +119,7 @@ function Figures({ answer }) {
 }
 
 function Result({ plan, path, take }) {
-  const { answer, request } = plan;
+  const { answer } = plan;
   const driven = useMemo(
     () => answer.profile.x_m.map((x, k) => [x, answer.profile.y_m[k], answer.profile.power_w[k]]),
     [answer],
@@ -135,7 +134,7 @@ function Result({ plan, path, take }) {
             <SpeedChart answer={answer} />
           </Panel>
           <Panel title="Compared with usual profiles">
-            <Baselines answer={answer} request={request} />
+            <Baselines answer={answer} />
           </Panel>
           <Panel title="Where the energy goes">
             <Waterfall terms={answer.ledger_j} total={answer.energy_j} measured={false} />

@@ -1,5 +1,4 @@
 // The panels of a plan: whether the charge suffices, its certificate, and the energy of usual profiles.
-import { get, idPath, post, useRead } from '../api.js';
 import { EnergyBars } from '../bars.jsx';
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
@@ -136,99 +135,31 @@ export function Certificate({ answer }) {
   return <Facts rows={rows} />;
 }
 
-// The usual speed profiles, for comparison with the plan. A profile that exceeds the robot's limits in the
-// plan's duration is slowed down until it satisfies them; its energy is that of the slower profile.
-
-// Multiples of the factor that speed and acceleration require.
-const slower = [1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2];
-const standing = 1e-6;
-
-// The factor of time by which speed, acceleration and yaw rate come within their limits.
-function leastFactor({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, limits) {
-  let factor = 1;
-  for (let k = 0; k < t.length; ++k) {
-    factor = Math.max(factor, Math.abs(v[k]) / limits.speed_m_s, Math.abs(w[k]) / limits.yaw_rate_rad_s);
-    if (k === 0 || t[k] <= t[k - 1]) continue;
-    const acceleration = Math.abs(v[k] - v[k - 1]) / (t[k] - t[k - 1]);
-    factor = Math.max(factor, Math.sqrt(acceleration / limits.acceleration_m_s2));
-  }
-  return factor;
-}
-
-// The same way in `factor` times the time; stops last as long as before.
-function slowed({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, factor) {
-  const stands = (k) => Math.abs(v[k]) < standing && Math.abs(w[k]) < standing;
-  const rows = [[t[0], v[0], w[0]]];
-  for (let k = 1; k < t.length; ++k) {
-    if (t[k] <= t[k - 1]) continue; // both sides of a corner
-    const pace = stands(k) && stands(k - 1) ? 1 : factor;
-    rows.push([rows[rows.length - 1][0] + (t[k] - t[k - 1]) * pace, v[k], w[k]]);
-  }
-  return {
-    time_s: rows.map(([at]) => at),
-    speed_m_s: rows.map(([, speed]) => speed / factor),
-    yaw_rate_rad_s: rows.map(([, , rate]) => rate / factor),
-  };
-}
-
-// {energyJ, durationS, slowed} of a baseline within the limits; null if none exists.
-async function withinLimits(baseline, { robotId, limits, payloadKg, mayScale, signal }) {
-  if (!baseline) return null;
-  if (baseline.within_limits)
-    return { energyJ: baseline.energy_j, durationS: baseline.duration_s, slowed: false };
-  if (!mayScale) return null;
-  const least = leastFactor(baseline.profile, limits);
-  for (const more of slower) {
-    const body = { profile: slowed(baseline.profile, least * more), payload_kg: payloadKg };
-    const priced = await post(`/v1/robots/${idPath(robotId)}/estimate`, body, signal);
-    if (priced.beyond_limits.length === 0)
-      return { energyJ: priced.energy_j, durationS: priced.duration_s, slowed: true };
-  }
-  return null;
-}
-
-async function readBaselines({ robot_id: robotId, baselines }, request, signal) {
-  const robot = await get(`/v1/robots/${idPath(robotId)}`, signal);
-  const question = {
-    robotId,
-    limits: robot.model.limits,
-    payloadKg: request.payload_kg,
-    mayScale: !request.path.some((leg) => leg.kind === 'payload'),
-    signal,
-  };
-  const kinds = [baselines.trapezoid, baselines.triangle];
-  return Promise.all(kinds.map((baseline) => withinLimits(baseline, question)));
-}
-
-// [trapezoid, triangle] within the robot's limits; undefined while they are computed, null if none exists.
-function useBaselines(answer, request) {
-  const key = JSON.stringify([answer.robot_id, request]);
-  const { value, path, error } = useRead((signal) => readBaselines(answer, request, signal), key, answer);
-  return { error, found: path === key && value ? value : [] };
-}
-
-function noteOf(found, plan) {
-  if (found === undefined) return 'computing …';
-  if (found === null) return 'not possible within the limits';
-  const saved = 1 - plan.energy_j / found.energyJ;
+function noteOf(of, slowed, plan) {
+  if (!of) return 'not possible within the limits';
+  const saved = 1 - plan.energy_j / of.energy_j;
   const by = format.share(Math.abs(saved), 1);
-  const time = `${format.span(found.durationS)}${found.slowed ? ', slowed to keep the limits' : ''}`;
+  const time = `${format.span(of.duration_s)}${slowed ? ', slowed to keep the limits' : ''}`;
   return `${time}; ${saved >= 0 ? `the plan saves ${by}` : `costs ${by} less`}`;
 }
 
-export function Baselines({ answer, request }) {
-  const { error, found } = useBaselines(answer, request);
-  if (error) return <Failure error={error} />;
-  const rows = ['Trapezoid', 'Triangle'].map((name, k) => [
-    name,
-    found[k]?.energyJ ?? null,
-    'plain',
-    noteOf(found[k], answer),
-  ]);
-  rows.unshift(['Least energy', answer.energy_j, 'least', format.span(answer.duration_s)]);
+// The usual speed profiles, slowed down where they exceed the robot's limits in the plan's duration.
+export function Baselines({ answer }) {
+  const { trapezoid, triangle } = answer.baselines;
+  const rowOf = ([name, baseline]) => {
+    const slowed = !baseline?.within_limits;
+    const of = slowed ? baseline?.slowed : baseline;
+    return [name, of?.energy_j ?? null, 'plain', noteOf(of, slowed, answer)];
+  };
   return (
     <>
-      <EnergyBars label="Energy of the plan, a trapezoid and a triangle within the limits" rows={rows} />
+      <EnergyBars
+        label="Energy of the plan, a trapezoid and a triangle within the limits"
+        rows={[
+          ['Least energy', answer.energy_j, 'least', format.span(answer.duration_s)],
+          ...Object.entries({ Trapezoid: trapezoid, Triangle: triangle }).map(rowOf),
+        ]}
+      />
       <p class="note foot">
         Each profile on every leg between stops, in the plan’s time if the robot’s limits allow it.
       </p>
