@@ -1,6 +1,8 @@
 // A dialog that is shown while `open`, with buttons to confirm, by `onSubmit(values of its fields by name)`,
 // and to cancel; `onClose` when it is closed in any way.
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
+import { onUnauthorized, post, sessionPath } from './api.js';
+import { keepSession } from './session.js';
 import { Button } from './widgets.jsx';
 
 export function Dialog({ open, title, action, onSubmit, onClose, children, ...more }) {
@@ -51,5 +53,45 @@ export function ConfirmButton({ label, title, action = label, onConfirm, childre
         {children}
       </Dialog>
     </>
+  );
+}
+
+// The dialog for a token, opened when the service rejects a request without one; once it is closed, only by
+// the user.
+export function SignIn() {
+  const closed = useRef(false);
+  const [open, setOpen] = useState(false);
+  const [said, setSaid] = useState('');
+  // Before the first response.
+  useLayoutEffect(
+    () =>
+      onUnauthorized(({ detail: wanted }) => {
+        keepSession(null);
+        if (wanted || !closed.current) setOpen(true);
+      }),
+    [],
+  );
+  const close = () => {
+    closed.current = true;
+    setOpen(false);
+  };
+  const submit = async ({ token }) => {
+    try {
+      keepSession(await post(sessionPath, { token: token.trim() }));
+      location.reload();
+    } catch (problem) {
+      setSaid(problem.message);
+    }
+  };
+  return (
+    <Dialog open={open} title="Sign in" action="Sign in" onSubmit={submit} onClose={close} class="sign-in">
+      <p>
+        <label class="field">
+          <span>Token</span>
+          <input name="token" type="password" autocomplete="current-password" required />
+        </label>
+      </p>
+      <p role="alert">{said}</p>
+    </Dialog>
   );
 }

@@ -1,16 +1,42 @@
 import { render } from 'preact';
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
-import './style.css';
-import { askToSignIn, useGet } from './api.js';
-import { clock } from './format.js';
+import { askToSignIn, useGet, useRead } from './api.js';
+import { SignIn } from './dialog.jsx';
 import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
+import { clock } from './format.js';
 import { startLive, useLive } from './live.js';
-import { toggleTheme, useTheme } from './theme.js';
 import { routeOf } from './route.js';
-import { SignIn } from './sign_in.jsx';
-import { Button, Empty, Guard } from './widgets.jsx';
+import './style.css';
+import { toggleTheme, useTheme } from './theme.js';
 import { Fleet } from './views/fleet.jsx';
-import { later } from './views/later.jsx';
+import { Answer, Button, Empty, Guard } from './widgets.jsx';
+
+let loaded = null;
+
+function loadStyle() {
+  const link = Object.assign(document.createElement('link'), { rel: 'stylesheet', href: 'views.css' });
+  const style = new Promise((resolve, reject) => Object.assign(link, { onload: resolve, onerror: reject }));
+  document.head.append(link);
+  return style;
+}
+
+async function load() {
+  try {
+    [loaded] = await Promise.all([import('./views/index.js'), loadStyle()]);
+  } catch {
+    const message = 'The service may be restarting, or the network is down.';
+    throw { title: 'This part of the page could not be loaded', message };
+  }
+}
+
+function Later({ part, ...props }) {
+  const loading = useRead(load, loaded ? null : 'views');
+  if (loaded === null) return <Answer of={loading} what="this part of the page" />;
+  const View = loaded[part];
+  return <View {...props} />;
+}
+
+const later = (part) => (props) => <Later part={part} {...props} />;
 
 // The views with the names of their tabs, or the tab that they belong to.
 const views = new Map(

@@ -1,6 +1,6 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { get, query, useRenewed } from '../api.js';
-import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
+import { consumption, energy, energyIn, energyScale, perMetre, useTariff, worthTexts } from '../energy.js';
 import * as format from '../format.js';
 import {
   Charge,
@@ -14,11 +14,10 @@ import {
   useAttention,
 } from '../health.jsx';
 import { showRecent, useLive, useModelled } from '../live.js';
-import { useRatios } from '../ratios.js';
+import { useRatios } from '../models.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Cells, Head, SortChoice, column, names, orderOf, sorted } from '../table.jsx';
-import { useTariff, worthTexts } from '../tariff.js';
 import {
   Button,
   Choice,

@@ -1,6 +1,5 @@
 // Squares of the floor in colours, with the zones of significant departure, read by the pointer or by keys.
-import { scaleFor } from '../colour.js';
-import { FloorView, Legend, drawZones, fit } from '../floor.jsx';
+import { FloorView, Legend, drawZones, fit, scaleFor } from '../floor.jsx';
 import { palette, useTheme } from '../theme.js';
 import { useNarrow } from '../widgets.jsx';
 

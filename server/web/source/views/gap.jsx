@@ -3,7 +3,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { del, post, query, useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
-import { useRatios } from '../ratios.js';
+import { useRatios } from '../models.js';
 import { robotLink } from '../route.js';
 import { Answer, Button, Empty, Failure, Heading, List, Panel, useOptions, useTitleOf } from '../widgets.jsx';
 import { Adopt } from './adopt.jsx';

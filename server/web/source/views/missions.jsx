@@ -1,11 +1,10 @@
 import { useMemo } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { consumption, energy } from '../energy.js';
+import { consumption, energy, useTariff, worthTexts } from '../energy.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';
 import { orderOf } from '../table.jsx';
-import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Button, Empty, Failure, Readouts, missionStates, useTitleOf } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, exportMissions } from './export.jsx';

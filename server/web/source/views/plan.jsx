@@ -16,10 +16,8 @@ import { useLive, useModelled } from '../live.js';
 import { keepInAddress } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
 import { Button, Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
-import { DrawPath } from './draw.jsx';
-import { Front, SpeedChart } from './plan_charts.jsx';
-import { PlanForm } from './plan_form.jsx';
-import { Baselines, Certificate, PlanVerdict } from './plan_panels.jsx';
+import { DrawPath, PlanForm } from './plan_form.jsx';
+import { Baselines, Certificate, Front, PlanVerdict, SpeedChart } from './plan_panels.jsx';
 
 const frontPoints = 24;
 const firstLegs = 'straight:6,turn:90,straight:4';

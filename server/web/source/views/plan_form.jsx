@@ -1,8 +1,119 @@
 // The form of a plan: the robot, the path as legs or drawn points, and the terms.
+import { useRef, useState } from 'preact/hooks';
 import { legKinds, newLeg } from '../drive_path.js';
+import { FloorView, drawDot, drawRobot, placeIn, strokeThrough, viewOf } from '../floor.jsx';
 import * as format from '../format.js';
+import { digits } from '../format.js';
+import { palette } from '../theme.js';
 import { Button, Choice } from '../widgets.jsx';
 import { Field, NumberInput, fieldsOf } from './choosing.jsx';
+
+const snapM = 0.25;
+const reachPx = 12;
+const snapped = (v) => Math.round(v / snapM) * snapM;
+
+// A path drawn point by point. Pointer: press adds, drag moves. Keys: arrows move the cross, Enter adds
+// there, Backspace takes the last away.
+export function DrawPath({ points, change }) {
+  const [acrossM, setAcross] = useState(16);
+  const [cross, setCross] = useState(null);
+  const held = useRef(null);
+  const view = useRef(null);
+  const near = ([px, py]) =>
+    points.findIndex(([x, y]) => {
+      const [qx, qy] = view.current.to(x, y);
+      return Math.hypot(px - qx, py - qy) < reachPx;
+    });
+  const floorAt = (p) => view.current.from(...p).map(snapped);
+  const add = (point) => {
+    const last = points[points.length - 1];
+    if (!last || last[0] !== point[0] || last[1] !== point[1]) change([...points, point]);
+  };
+  const down = (event) => {
+    const p = placeIn(event);
+    const hit = near(p);
+    event.currentTarget.setPointerCapture(event.pointerId);
+    if (hit >= 0) held.current = hit;
+    else {
+      add(floorAt(p));
+      held.current = points.length;
+    }
+  };
+  const move = (event) => {
+    if (held.current === null) return;
+    const point = floorAt(placeIn(event));
+    const here = points[held.current];
+    if (here && (here[0] !== point[0] || here[1] !== point[1]))
+      change(points.map((old, k) => (k === held.current ? point : old)));
+  };
+  const up = () => {
+    held.current = null;
+  };
+  const key = (event) => {
+    const step = event.shiftKey ? 4 * snapM : snapM;
+    const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[
+      event.key
+    ];
+    const from = cross ?? points[points.length - 1] ?? [0, 0];
+    if (way) setCross([from[0] + way[0], from[1] + way[1]]);
+    else if (event.key === 'Enter') add(from);
+    else if (event.key === 'Backspace' || event.key === 'Delete') change(points.slice(0, -1));
+    else return;
+    event.preventDefault();
+  };
+  const viewFor = (width, tall) => (view.current = viewOf(width / acrossM, 0, 0, width, tall));
+  const draw = (c, v) => {
+    const p = palette();
+    c.strokeStyle = c.fillStyle = p.accent;
+    c.lineWidth = 3;
+    c.lineJoin = 'round';
+    const places = points.map(([x, y]) => v.to(x, y));
+    strokeThrough(c, ...places.flat());
+    places.forEach((place, k) => drawDot(c, place, 5, k === points.length - 1 ? p.accent : p.screen));
+    const [[x0, y0] = [], [x1, y1] = [x0 + 1, y0]] = points;
+    if (points.length > 0) drawRobot(c, v, x0, y0, Math.atan2(y1 - y0, x1 - x0), p.ink);
+    if (cross) {
+      const [x, y] = v.to(...cross);
+      c.strokeStyle = p.ink;
+      c.lineWidth = 1;
+      strokeThrough(c, x - 12, y, x + 12, y);
+      strokeThrough(c, x, y - 12, x, y + 12);
+    }
+  };
+  const button = (text, onClick, disabled, label) => (
+    <Button onClick={onClick} disabled={disabled} aria-label={label}>
+      {text}
+    </Button>
+  );
+  return (
+    <div class="draw">
+      <FloorView
+        viewFor={viewFor}
+        draw={draw}
+        height={400}
+        changes={[points, acrossM, cross]}
+        role="application"
+        tabindex="0"
+        label={`Drawing of the path, ${points.length} points. Arrow keys move the cross, Enter adds a point, Backspace removes the last.${cross ? ` Cross at ${digits(cross[0], 3)}, ${digits(cross[1], 3)} metres.` : ''}`}
+        onPointerDown={down}
+        onPointerMove={move}
+        onPointerUp={up}
+        onPointerCancel={up}
+        onKeyDown={key}
+      />
+      <div class="tools">
+        {button('Undo point', () => change(points.slice(0, -1)), points.length === 0)}
+        {button('Clear', () => change([]), points.length === 0)}
+        {button('+', () => setAcross(acrossM / 2), acrossM <= 4, 'Closer')}
+        {button('−', () => setAcross(acrossM * 2), acrossM >= 256, 'Wider')}
+        <span class="note">
+          Click to add a point, drag to move it; points snap to {snapM} m. The robot turns in place at
+          corners.
+        </span>
+      </div>
+    </div>
+  );
+}
 
 function LegFields({ leg, number, set }) {
   return Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (

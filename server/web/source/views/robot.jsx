@@ -11,11 +11,10 @@ import { Sparkline } from '../sparkline.jsx';
 import { Button, Empty, Facts, Failure, Heading, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { flat } from './changes.jsx';
 import { Field } from './choosing.jsx';
-import { Events, useEvents } from './events.jsx';
+import { Events, useEvents } from './audit.jsx';
 import { ownPart } from './fleet.jsx';
 import { MissionTable } from './mission_rows.jsx';
-import { RobotHistory } from './robot_history.jsx';
-import { Proposals } from './robot_models.jsx';
+import { Proposals, RobotHistory } from './robot_history.jsx';
 
 const recentRows = 12;
 const recentEvents = 12;

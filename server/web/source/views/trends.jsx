@@ -4,12 +4,21 @@ import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
 import { Strips } from '../bars.jsx';
 import { Chart, axis, bars, dateAxis, line, timesWith, withGaps } from '../chart.jsx';
-import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
+import {
+  consumption,
+  energy,
+  energyIn,
+  energyScale,
+  perMetre,
+  useTariff,
+  worthNames,
+  worthOf,
+  worthTexts,
+} from '../energy.js';
 import * as format from '../format.js';
 import { newest } from '../logs.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
-import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import { palette } from '../theme.js';
 import { effectOn, termName } from '../waterfall.jsx';
 import { Answer, Choice, Panel, Quantity, Ratio, Readouts, useTitleOf } from '../widgets.jsx';
