@@ -14,14 +14,6 @@ const stops = {
   },
 };
 
-function table(of) {
-  return Array.from({ length: 64 }, (_, k) => {
-    const at = (k / 63) * (of.length - 1);
-    const low = Math.min(Math.floor(at), of.length - 2);
-    return `color-mix(in srgb, ${of[low + 1]} ${(100 * (at - low)).toFixed(1)}%, ${of[low]})`;
-  });
-}
-
 // {low, high, colour_of(value), colours}: 'power' from 0 to the 98th percentile, 'gap' symmetric about 0.
 export function scaleFor(kind, values) {
   const finite = values
@@ -32,13 +24,13 @@ export function scaleFor(kind, values) {
   const step = 10 ** Math.floor(Math.log10(top)) / 2;
   const high = Math.ceil(top / step) * step;
   const low = kind === 'gap' ? -high : 0;
-  const colours = table(stops[kind][isDark() ? 'dark' : 'light']);
-  return {
-    low,
-    high,
-    colours,
-    colourOf: (value) => colours[Math.max(0, Math.min(63, Math.round(((value - low) / (high - low)) * 63)))],
+  const colours = stops[kind][isDark() ? 'dark' : 'light'];
+  const colourOf = (value) => {
+    const at = Math.max(0, Math.min(1, (value - low) / (high - low))) * (colours.length - 1);
+    const k = Math.min(Math.floor(at), colours.length - 2);
+    return `color-mix(in srgb, ${colours[k + 1]} ${(100 * (at - k)).toFixed(1)}%, ${colours[k]})`;
   };
+  return { low, high, colours, colourOf };
 }
 
 // Begins a path through places of the canvas, x and y of each.
@@ -258,6 +250,13 @@ export function drawZones(c, view, zones) {
     drawText(c, view, text, left, Math.max(top - 10, 10), p.gap);
   });
 }
+
+// The power of a trace's k-th part, modelled where it is not measured; null where neither is known.
+export const powerAt = ({ measured_power_w: measured, modelled_power_w: modelled }, k) =>
+  measured.mean[k] ?? modelled.mean[k];
+
+// Rows [x m, y m, value(k)] of a trace.
+export const rowsOf = ({ x_m: x, y_m: y }, value) => x.map((m, k) => [m ?? NaN, y[k] ?? NaN, value?.(k)]);
 
 // `points`: rows [x m, y m, value]. `cursor`: index of the row to mark, or null. `under`: a path drawn dashed
 // below it.

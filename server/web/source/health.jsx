@@ -28,6 +28,9 @@ export const unheard = (state) => state.silent_s === null;
 // The value if the robot is live, else null: the last value is not valid for a silent robot.
 export const now = (state, value) => (state.live ? value : null);
 
+// The power of a live robot: modelled where it is not measured.
+export const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
+
 // A time, as short as today allows.
 export function since(utimeUs) {
   const [day, clock] = format.time(utimeUs).split(' ');

@@ -36,7 +36,6 @@ const state = {
   error: null,
   robots,
   revision: 0,
-  events: 0,
 };
 const listeners = new Set();
 let source = null;
@@ -149,7 +148,6 @@ function connect() {
     link('live');
   });
   source.addEventListener('state', (event) => {
-    state.events += 1;
     take(JSON.parse(event.data));
     changed();
   });

@@ -4,17 +4,11 @@ import { query } from './api.js';
 // "#/missions/12" -> view mission, id 12; "#/missions?state=open" -> view missions, given {state: 'open'}.
 export function routeOf(hash) {
   const [path, values] = hash.replace(/^#\/?/, '').split('?');
-  const [view = '', id] = path.split('/');
+  const [view = 'fleet', name = ''] = path.split('/').filter(Boolean);
   const given = Object.fromEntries(new URLSearchParams(values ?? ''));
-  if (view === '') return { view: 'fleet', given, hash };
-  if (id === undefined || id === '') return { view: view === 'robots' ? 'fleet' : view, given, hash };
-  let name = id;
-  try {
-    name = decodeURIComponent(id);
-  } catch {
-    // not an address of this page; shown unchanged
-  }
-  return { view: view === 'missions' ? 'mission' : view, id: name, given, hash };
+  const id = new URLSearchParams(`id=${name}`).get('id'); // of any text, unlike decodeURIComponent()
+  if (id === '') return { view: view === 'robots' ? 'fleet' : view, given, hash };
+  return { view: view === 'missions' ? 'mission' : view, id, given, hash };
 }
 
 export const robotLink = (id) => `#/robots/${encodeURIComponent(id)}`;

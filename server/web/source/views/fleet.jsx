@@ -10,6 +10,7 @@ import {
   lowCharge,
   needsSomeone,
   now,
+  powerNow,
   unheard,
   useAttention,
 } from '../health.jsx';
@@ -39,7 +40,6 @@ const reorderMs = 3000;
 const todayMs = 60_000;
 const weekMs = 7 * 86_400_000;
 
-const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
 const speedNow = ({ state }) => now(state, state.speed_m_s);
 const timeOf = ({ state }) => state.run_time_s;
 const spentOf = ({ state }) => state.mission?.energy.battery_j;

@@ -4,7 +4,7 @@ import { del, putFile, query, useGet } from '../api.js';
 import { ConfirmButton } from '../dialog.jsx';
 import { drawZones } from '../floor.jsx';
 import * as format from '../format.js';
-import { needsSomeone, now, useAttention } from '../health.jsx';
+import { needsSomeone, powerNow, useAttention } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { robotLink, useChoices } from '../route.js';
 import { TablePanel, column, figure, names } from '../table.jsx';
@@ -24,21 +24,10 @@ const numbers = [
 
 // The fields of a map.yaml of ROS.
 function fromMapYaml(text) {
-  const resolution = /^resolution:\s*([-+.\deE]+)/m.exec(text)?.[1];
-  const origin =
-    /^origin:\s*\[([^\]]+)\]/m
-      .exec(text)?.[1]
-      .split(',')
-      .map((part) => part.trim()) ?? [];
-  const found = {
-    resolution_m: resolution,
-    origin_x_m: origin[0],
-    origin_y_m: origin[1],
-    origin_yaw_rad: origin[2],
-  };
-  return Object.fromEntries(
-    Object.entries(found).filter(([, value]) => Number.isFinite(Number(value ?? NaN))),
-  );
+  const numbersOf = (key) =>
+    new RegExp(`^${key}:(.*)`, 'm').exec(text)?.[1].match(/[-+.\d][-+.\deE]*/g) ?? [];
+  const found = [numbersOf('resolution')[0], ...numbersOf('origin')];
+  return Object.fromEntries(numbers.map(([key], k) => [key, found[k]]).filter(([, value]) => value));
 }
 
 function FloorPlanForm({ place, level, onChange }) {
@@ -148,12 +137,11 @@ function zonesPath(ids) {
   return `/v1/floor-map${query({ robot_id: ids.join(), from_utime_us: (midnight - zoneDays * 86_400_000) * 1000, limit: 1 })}`;
 }
 
-const powerOf = ({ state: s }) => now(s, s.measured_power_w ?? s.modelled_power_w);
 const stateOf = ({ state: s }) =>
   s.charging ? 'charging' : s.mission ? 'on a mission' : s.live ? 'idle' : 'silent';
 const columns = [
   column('robot', 'Robot', (e) => <a href={robotLink(e.id)}>{e.id}</a>, { head: true }),
-  figure('power', 'Power', (e) => format.power(powerOf(e))),
+  figure('power', 'Power', (e) => format.power(powerNow(e.state))),
   figure('charge', 'Charge', (e) => format.percent(e.state.state_of_charge)),
   column('state', 'State', stateOf),
 ];

@@ -2,6 +2,7 @@
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import { lastAt } from '../chart.jsx';
+import { powerAt, rowsOf } from '../floor.jsx';
 import * as format from '../format.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
@@ -27,7 +28,7 @@ function usePlayed(id) {
       mission: mission.value,
       trace: of,
       t: of.start_utime_us.map((us) => (us - mission.value.start_utime_us) / 1e6),
-      rows: of.x_m.map((x, k) => [x ?? NaN, of.y_m[k] ?? NaN]),
+      rows: rowsOf(of),
     };
   }, [id, mission.value, trace.value]);
   return [played, mission.error ?? trace.error];
@@ -53,10 +54,9 @@ function Name({ of: { mission }, colour }) {
   );
 }
 
-const powerAt = ({ of: { trace }, k }) => trace.measured_power_w.mean[k] ?? trace.modelled_power_w.mean[k];
 const columns = [
   column('mission', 'Mission', Name, { head: true }),
-  figure('power', 'Power', (row) => format.power(powerAt(row))),
+  figure('power', 'Power', (row) => format.power(powerAt(row.of.trace, row.k))),
   figure('speed', 'Speed', ({ of, k }) => format.unit(of.trace.speed_m_s.mean[k], 'm/s', 2)),
   figure('charge', 'Charge', ({ of, k }) => format.percent(of.trace.state_of_charge[k], 1)),
 ];

@@ -2,9 +2,19 @@ import { useEffect, useState } from 'preact/hooks';
 import { idPath, post, query, useGet } from '../api.js';
 import { ConfirmButton } from '../dialog.jsx';
 import { energy } from '../energy.js';
-import { FloorPath } from '../floor.jsx';
+import { FloorPath, powerAt, rowsOf } from '../floor.jsx';
 import * as format from '../format.js';
-import { Health, Reasons, between, chargeNote, now, since, unheard, useAttention } from '../health.jsx';
+import {
+  Health,
+  Reasons,
+  between,
+  chargeNote,
+  now,
+  powerNow,
+  since,
+  unheard,
+  useAttention,
+} from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
@@ -45,11 +55,7 @@ function LiveMap({ entry }) {
   const live = entry.path.last();
   const before =
     mission && begun.value && begun.value.id === mission
-      ? begun.value.x_m.map((x, k) => [
-          x ?? NaN,
-          begun.value.y_m[k] ?? NaN,
-          begun.value.measured_power_w.mean[k] ?? begun.value.modelled_power_w.mean[k] ?? NaN,
-        ])
+      ? rowsOf(begun.value, (k) => powerAt(begun.value, k) ?? NaN)
       : [];
   const rows = [...before, ...live.map(([, x, y, w]) => [x, y, w])];
   const [x, y, heading] = entry.state.pose;
@@ -76,7 +82,7 @@ function Now({ entry }) {
   const rows = [
     [
       measured ? 'Power' : 'Power (modelled)',
-      format.power(now(s, s.measured_power_w ?? s.modelled_power_w)),
+      format.power(powerNow(s)),
       trace,
       measured ? 'measured' : 'modelled',
     ],
@@ -219,6 +225,7 @@ export function Robot({ id }) {
   const detail = useGet(`/v1/robots/${idPath(id)}`);
   const entry = live.robots.get(id);
   const s = entry?.state;
+  const heard = s && !unheard(s);
   useEffect(() => {
     if (entry) showRecent([entry]);
   }, [entry, live.loads]);
@@ -239,11 +246,11 @@ export function Robot({ id }) {
         )}
       />
       {failure && <Failure error={failure} />}
-      {s && !unheard(s) && <Now entry={entry} />}
+      {heard && <Now entry={entry} />}
       {(s || detail.value) && <WithModel id={id} detail={detail} />}
       <RecentMissions id={id} running={s?.mission?.id} />
       <div class="columns">
-        {entry && !unheard(s) ? (
+        {heard ? (
           <Panel class="screen" title={s.live ? 'Position' : 'Last known position'}>
             <LiveMap entry={entry} />
           </Panel>
@@ -251,7 +258,7 @@ export function Robot({ id }) {
           <RecentEvents id={id} />
         )}
         <div>
-          {entry && !unheard(s) && <RecentEvents id={id} />}
+          {heard && <RecentEvents id={id} />}
           <Panel title="Model">
             {detail.value ? <Model model={detail.value.model} /> : <p class="note">none</p>}
           </Panel>

@@ -2,7 +2,7 @@
 import { useMemo, useRef, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import { Chart, axis, lastAt, line, runAxis, withAlpha, withGaps } from '../chart.jsx';
-import { FloorPath } from '../floor.jsx';
+import { FloorPath, powerAt, rowsOf } from '../floor.jsx';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { Answer, Button, Choice, Empty, Key, Panel, Readouts } from '../widgets.jsx';
@@ -233,16 +233,11 @@ function AtCursor({ trace, mission, index }) {
 
 // The path on the floor, coloured by power or by the gap, with the place of the charts' cursor.
 function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
-  const path = useMemo(
-    () =>
-      way.x_m.map((x, k) => {
-        const m = way.measured_power_w.mean[k];
-        const f = way.modelled_power_w.mean[k];
-        const gap = m === null ? NaN : m - f;
-        return [x ?? NaN, way.y_m[k] ?? NaN, colouring === 'gap' ? gap : (m ?? f ?? NaN)];
-      }),
-    [way, colouring],
-  );
+  const path = useMemo(() => {
+    const [measured, modelled] = [way.measured_power_w.mean, way.modelled_power_w.mean];
+    const gapAt = (k) => (measured[k] === null ? NaN : measured[k] - modelled[k]);
+    return rowsOf(way, colouring === 'gap' ? gapAt : (k) => powerAt(way, k) ?? NaN);
+  }, [way, colouring]);
   const known = cursor !== null && cursor < trace.start_utime_us.length;
   const here = known ? lastAt(way.start_utime_us, trace.start_utime_us[cursor] + trace.width_us / 2) : null;
   const options = { power: 'Power', ...(measured && { gap: 'Gap' }) };
