@@ -9,7 +9,7 @@ import { routeOf } from './route.js';
 import './style.css';
 import { toggleTheme, useTheme } from './theme.js';
 import { Fleet } from './views/fleet.jsx';
-import { Answer, Button, Empty, Guard } from './widgets.jsx';
+import { Answer, Button, Empty, Guard, useTitleOf } from './widgets.jsx';
 
 let loaded = null;
 
@@ -120,7 +120,8 @@ function App() {
       main.current.focus({ preventScroll: true });
     }
   }, [route.view, route.id]);
-  const [View, , here = route.view] = views.get(route.view) ?? [];
+  const [View, name, here = route.view] = views.get(route.view) ?? [];
+  useTitleOf(name); // until the view sets another one
   const change = unit === 'Wh' ? 'show energy in joules' : 'show energy in watt hours';
   const theme = dark ? 'Light theme' : 'Dark theme';
   const tab = ([view, [, name]]) =>

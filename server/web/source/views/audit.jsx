@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { useNewest } from '../logs.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
-import { Button, Choice, Heading, List, useTitleOf } from '../widgets.jsx';
+import { Button, Choice, Heading, List } from '../widgets.jsx';
 import { RobotField, TextField } from './choosing.jsx';
 import { verdictTitle } from './jobs.jsx';
 
@@ -219,7 +219,6 @@ function RobotEvents({ given: { robot }, change }) {
 }
 
 export function Audit({ given: asked }) {
-  useTitleOf('Log');
   const [given, change] = useChoices(asked);
   const subject = given.of === 'requests' ? 'requests' : '';
   return (

@@ -4,7 +4,7 @@ import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { robotLink, useChoices } from '../route.js';
 import { Table, TablePanel, column, figure, orderOf, sorted } from '../table.jsx';
-import { Answer, Empty, Facts, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, Facts, Failure, Heading, Panel, Readouts } from '../widgets.jsx';
 
 const renewMs = 2000;
 const lateStoredS = 10; // samples are stored twice a second
@@ -137,7 +137,6 @@ function Shown({ of, live }) {
 }
 
 export function Cluster() {
-  useTitleOf('Cluster');
   const live = useLive();
   const cluster = useGet('/v1/cluster', 0, renewMs);
   return (

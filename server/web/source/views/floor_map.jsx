@@ -5,17 +5,7 @@ import { consumption, energy, energyIn, energyScale, useTariff, worthTexts } fro
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
-import {
-  Answer,
-  Button,
-  Choice,
-  Empty,
-  Panel,
-  Quantity,
-  Readouts,
-  useNarrow,
-  useTitleOf,
-} from '../widgets.jsx';
+import { Answer, Button, Choice, Empty, Panel, Quantity, Readouts, useNarrow } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, SelectField, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, saveText } from './export.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
@@ -216,7 +206,6 @@ function Shown({ map, show, stale }) {
 }
 
 export function Floor({ given: asked }) {
-  useTitleOf('Floor');
   const [given, change] = useChoices(asked);
   const field = fieldsOf(given, change);
   const show = given.show in subjects ? given.show : 'gap';

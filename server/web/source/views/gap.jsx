@@ -138,7 +138,6 @@ function Start({ given, onStart }) {
 }
 
 function All({ given }) {
-  useTitleOf('Gap');
   const jobs = useGet(`/v1/diagnoses${query({ robot_id: given.robot, limit: 50 })}`);
   const running =
     jobs.value?.diagnoses.find((d) => d.state === 'running') ??

@@ -1,5 +1,5 @@
 import sections from '../help.md';
-import { Heading, useTitleOf } from '../widgets.jsx';
+import { Heading } from '../widgets.jsx';
 
 const Terms = ({ of }) => (
   <dl class="glossary">
@@ -13,7 +13,6 @@ const Terms = ({ of }) => (
 );
 
 export function Help() {
-  useTitleOf('Help');
   return sections.map(({ title, terms, text }, k) => [
     k === 0 ? <Heading title={title} /> : <h2>{title}</h2>,
     text ? <p>{text}</p> : <Terms of={terms} />,

@@ -9,7 +9,7 @@ import { showRecent, useLive } from '../live.js';
 import { robotLink, useChoices } from '../route.js';
 import { TablePanel, column, figure, names } from '../table.jsx';
 import { palette } from '../theme.js';
-import { Answer, Button, Choice, Empty, Failure, Panel, useTitleOf } from '../widgets.jsx';
+import { Answer, Button, Choice, Empty, Failure, Panel } from '../widgets.jsx';
 import { Field, SelectField, fieldsOf } from './choosing.jsx';
 import { MapCanvas, drawLine, drawNamed, planPath, useImage } from './map_canvas.jsx';
 import { Playback } from './playback.jsx';
@@ -252,7 +252,6 @@ function Shown({ maps, given, change, reload }) {
 }
 
 export function FloorLive({ given: asked }) {
-  useTitleOf('Map');
   const [given, change] = useChoices(asked);
   const maps = useGet('/v1/maps', 0, renewMs);
   return (

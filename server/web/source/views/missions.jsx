@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';
 import { orderOf } from '../table.jsx';
-import { Answer, Button, Empty, Failure, Readouts, missionStates, useTitleOf } from '../widgets.jsx';
+import { Answer, Button, Empty, Failure, Readouts, missionStates } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, exportMissions } from './export.jsx';
 import { MissionTable, sortNames } from './mission_rows.jsx';
@@ -152,7 +152,6 @@ function List({ given, list, total, sort, onSort }) {
 }
 
 export function Missions({ given: asked }) {
-  useTitleOf('Missions');
   const [given, change] = useChoices(asked);
   const filter = useMemo(() => filterOf(given), [given]);
   const [sort, onSort] = orderOf(given, change, { key: 'start', down: true });

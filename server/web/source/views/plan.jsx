@@ -15,7 +15,7 @@ import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
 import { keepInAddress } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import { Button, Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Button, Empty, Failure, Loading, Panel, Readouts } from '../widgets.jsx';
 import { DrawPath, PlanForm } from './plan_form.jsx';
 import { Baselines, Certificate, Front, PlanVerdict, SpeedChart } from './plan_panels.jsx';
 
@@ -208,7 +208,6 @@ function ResultArea({ plan, given, change }) {
 }
 
 export function Plan({ given: address }) {
-  useTitleOf('Plan');
   const live = useLive();
   const robots = useModelled();
   const [given, change] = useQuestion(address, robots);

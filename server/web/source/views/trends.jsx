@@ -21,7 +21,7 @@ import { missionLink, robotLink, useChoices } from '../route.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
 import { effectOn, termName } from '../waterfall.jsx';
-import { Answer, Choice, Panel, Quantity, Ratio, Readouts, useTitleOf } from '../widgets.jsx';
+import { Answer, Choice, Panel, Quantity, Ratio, Readouts } from '../widgets.jsx';
 import {
   Filters,
   Misordered,
@@ -400,7 +400,6 @@ function Fields({ given, change: set, kind, missions }) {
 }
 
 export function Trends({ given: asked }) {
-  useTitleOf('Trends');
   const [given, set] = useChoices(asked);
   const kind = given.by === 'week' ? 'week' : 'day';
   const missions = given.of === 'missions';
