@@ -126,59 +126,46 @@ export function drawRobot(c, view, x, y, heading, colour) {
   c.restore();
 }
 
-// A canvas that fills its box at the screen's density, drawn by `draw(context, width, height)`.
-export function Canvas({ draw, height, label, changes, ...more }) {
+// A canvas to scale with grid and scale bar, which fills its box at the screen's density. `draw(context, view)`
+// draws between them in the view that `viewFor(width, height)` gives; `onPlace(x m, y m, view, event)` is called
+// where the pointer moves or clicks.
+export function FloorView({ viewFor, draw, under = drawGrid, onPlace, height, changes, children, ...more }) {
   const canvas = useRef(null);
-  const latest = useRef(draw);
+  const view = useRef(null);
+  const latest = useRef(null);
   const dark = useTheme();
-  latest.current = draw;
-  const paint = () => {
-    const at = canvas.current;
-    const density = devicePixelRatio || 1;
+  latest.current = () => {
+    const { current: at } = canvas;
     const width = at?.clientWidth ?? 0;
     if (width === 0) return;
-    if (at.width !== Math.round(width * density) || at.height !== Math.round(height * density)) {
-      at.width = Math.round(width * density);
-      at.height = Math.round(height * density);
-    }
+    const density = devicePixelRatio || 1;
+    at.width = Math.round(width * density);
+    at.height = Math.round(height * density);
     const c = at.getContext('2d');
-    c.setTransform(density, 0, 0, density, 0, 0);
-    c.clearRect(0, 0, width, height);
-    latest.current(c, width, height);
-  };
-  useLayoutEffect(() => {
-    const observer = new ResizeObserver(paint);
-    observer.observe(canvas.current);
-    return () => observer.disconnect();
-  }, [height]);
-  useEffect(paint, [dark, ...changes]);
-  return (
-    <canvas
-      class="floor"
-      role="img"
-      aria-label={label}
-      ref={canvas}
-      style={{ height: `${height}px` }}
-      {...more}
-    />
-  );
-}
-
-// A canvas to scale with grid and scale bar. `viewFor(width, height)` gives its view, and
-// `draw(context, view)` draws the content between them; `onPlace(x m, y m, view)` is called at a click, with
-// `hover` also where the pointer is.
-export function FloorView({ viewFor, draw, under = drawGrid, onPlace, hover, children, ...more }) {
-  const view = useRef(null);
-  const paint = (c, width, tall) => {
-    const v = (view.current = viewFor(width, tall));
+    c.scale(density, density);
+    const v = (view.current = viewFor(width, height));
     under(c, v);
     draw(c, v);
     drawScaleBar(c, v);
   };
-  const point = (event) => onPlace?.(...view.current.from(...placeIn(event)), view.current);
+  useLayoutEffect(() => {
+    const observer = new ResizeObserver(() => latest.current());
+    observer.observe(canvas.current);
+    return () => observer.disconnect();
+  }, [height]);
+  useEffect(() => latest.current(), [dark, ...changes]);
+  const point = (event) => onPlace?.(...view.current.from(...placeIn(event)), view.current, event);
   return (
     <div class="floor-box">
-      <Canvas draw={paint} onClick={point} onPointerMove={hover && point} {...more} />
+      <canvas
+        class="floor"
+        role="img"
+        ref={canvas}
+        style={{ height: `${height}px` }}
+        onClick={point}
+        onPointerMove={point}
+        {...more}
+      />
       {children}
     </div>
   );
@@ -306,7 +293,7 @@ export function FloorPath({
       viewFor={viewFor}
       draw={draw}
       height={height}
-      label={label}
+      aria-label={label}
       changes={[points, kind, cursor, robot, under]}
     >
       {legend && shown.some((row) => row[2] > 0 || kind === 'gap') && (

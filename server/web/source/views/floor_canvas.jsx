@@ -81,9 +81,8 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
       changes={[map, title, unit, marked, height]}
       role="application"
       tabindex="0"
-      label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones. Arrow keys go from square to square; the tables below have the same figures.`}
+      aria-label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones. Arrow keys go from square to square; the tables below have the same figures.`}
       onPlace={point}
-      hover
       onKeyDown={key}
     >
       <Legend scale={scale} title={title} unit={unit} />

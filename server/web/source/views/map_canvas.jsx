@@ -103,9 +103,9 @@ export function MapCanvas({ level, image, points, draw, changes, label, onPick }
       draw={paint}
       under={image ? (c, view) => drawPlan(c, view, level, image) : undefined}
       height={height}
-      label={label}
+      aria-label={label}
       changes={[image, level, height, ...changes]}
-      onPlace={(x, y, view) => onPick?.(x, y, 12 / view.scale)}
+      onPlace={(x, y, view, { type }) => type === 'click' && onPick?.(x, y, 12 / view.scale)}
     />
   );
 }

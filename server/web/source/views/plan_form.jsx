@@ -94,7 +94,7 @@ export function DrawPath({ points, change }) {
         changes={[points, acrossM, cross]}
         role="application"
         tabindex="0"
-        label={`Drawing of the path, ${points.length} points. Arrow keys move the cross, Enter adds a point, Backspace removes the last.${cross ? ` Cross at ${digits(cross[0], 3)}, ${digits(cross[1], 3)} metres.` : ''}`}
+        aria-label={`Drawing of the path, ${points.length} points. Arrow keys move the cross, Enter adds a point, Backspace removes the last.${cross ? ` Cross at ${digits(cross[0], 3)}, ${digits(cross[1], 3)} metres.` : ''}`}
         onPointerDown={down}
         onPointerMove={move}
         onPointerUp={up}
