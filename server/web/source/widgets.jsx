@@ -22,23 +22,17 @@ export function Quantity({ of, sign }) {
 // A quantity as such; anything else unchanged.
 export const shown = (of) => (of?.u === undefined ? of : <Quantity of={of} />);
 
-function Readout({ label, of, note, channel, large }) {
-  return (
-    <div class={`readout ${large ? 'large' : ''} ${channel ?? ''}`}>
-      <dt>{label}</dt>
-      <dd>
-        {typeof of === 'string' ? <span class="number">{of}</span> : <Quantity of={of} />}
-        {note && <span class="note">{note}</span>}
-      </dd>
-    </div>
-  );
-}
-
 // Figures side by side, of rows [label, of, note, channel]; false rows are left out.
 export const Readouts = ({ rows, large, class: name = '' }) => (
   <dl class={`readouts ${name}`}>
     {rows.filter(Boolean).map(([label, of, note, channel]) => (
-      <Readout key={label} large={large} label={label} of={of} note={note} channel={channel} />
+      <div key={label} class={`readout ${large ? 'large' : ''} ${channel ?? ''}`}>
+        <dt>{label}</dt>
+        <dd>
+          {typeof of === 'string' ? <span class="number">{of}</span> : <Quantity of={of} />}
+          {note && <span class="note">{note}</span>}
+        </dd>
+      </div>
     ))}
   </dl>
 );
