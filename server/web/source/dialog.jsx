@@ -22,7 +22,7 @@ export function Dialog({ open, title, action, onSubmit, onClose, children, ...mo
         <form onSubmit={submit}>
           <h2>{title}</h2>
           {children}
-          <p class="tools">
+          <p class="row wrap tools">
             <button type="submit" class="primary">
               {action}
             </button>

@@ -305,7 +305,7 @@ export function FloorPath({
 
 export function Legend({ scale, title, unit = 'W' }) {
   return (
-    <div class="legend">
+    <div class="row legend">
       <span>{title}</span>
       <span class="number">{digits(scale.low, 2)}</span>
       <span class="colours" style={{ background: `linear-gradient(90deg, ${scale.colours})` }} />

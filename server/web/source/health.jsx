@@ -71,7 +71,7 @@ export function Health({ state, reasons = [] }) {
   const calm = !short || reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged;
   return (
     <>
-      <span class="telemetry">
+      <span class="row telemetry">
         <span class={`lamp ${level}`} aria-hidden="true" />
         {text}
       </span>

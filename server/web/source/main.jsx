@@ -68,7 +68,7 @@ function Link() {
   const live = useLive();
   const [name, tone] = links[live.link];
   return (
-    <span class={`link ${live.link}`} role="status">
+    <span class={`row link ${live.link}`} role="status">
       <span class={`lamp ${tone}`} aria-hidden="true" />
       {name}
     </span>
@@ -127,7 +127,7 @@ function App() {
   const tab = ([view, [, name]]) =>
     name &&
     (clustered || view !== 'cluster') && (
-      <a key={view} href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
+      <a key={view} class="row" href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
         {name}
       </a>
     );
@@ -140,8 +140,8 @@ function App() {
       <a class="skip" href="#main" onClick={skip}>
         Skip to content
       </a>
-      <header class="top">
-        <a class="mark" href="#/fleet" aria-label="joulecast, fleet">
+      <header class="row top">
+        <a class="row mark" href="#/fleet" aria-label="joulecast, fleet">
           <svg viewBox="0 0 32 20" width="38" height="24" aria-hidden="true">
             <path d="M1 14h6l4-12 6 17 4-10 2 5h8" />
           </svg>
@@ -157,7 +157,7 @@ function App() {
         >
           {unit}
         </Button>
-        <Button class="theme" onClick={toggleTheme} aria-label={theme} title={theme}>
+        <Button class="row theme" onClick={toggleTheme} aria-label={theme} title={theme}>
           <svg viewBox="0 0 20 20" width="18" height="18" aria-hidden="true">
             <circle cx="10" cy="10" r="7.5" class="ring" />
             <path d="M10 2.5a7.5 7.5 0 0 1 0 15z" />

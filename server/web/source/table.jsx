@@ -66,7 +66,7 @@ export function SortChoice({ columns, sort, onSort }) {
   const sortable = columns.filter((c) => c.sort);
   return (
     <span class="sort-choice">
-      <label class="with-unit">
+      <label class="row with-unit">
         <span class="note">Sort by</span>
         <select value={sort.key} onChange={(event) => onSort(event.currentTarget.value)}>
           {sortable.map((c) => (

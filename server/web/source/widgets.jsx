@@ -24,7 +24,7 @@ export const shown = (of) => (of?.u === undefined ? of : <Quantity of={of} />);
 
 // Figures side by side, of rows [label, of, note, channel]; false rows are left out.
 export const Readouts = ({ rows, large, class: name = '' }) => (
-  <dl class={`readouts ${name}`}>
+  <dl class={`wrap readouts ${name}`}>
     {rows.filter(Boolean).map(([label, of, note, channel]) => (
       <div key={label} class={`readout ${large ? 'large' : ''} ${channel ?? ''}`}>
         <dt>{label}</dt>
@@ -124,9 +124,9 @@ export const List = ({ of, what, from = (value) => value, none, more, children }
 export function Panel({ title, aside, children, class: name }) {
   return (
     <section class={`panel ${name ?? ''}`}>
-      <header>
+      <header class="row wrap">
         <h2>{title}</h2>
-        {aside && <div class="aside">{aside}</div>}
+        {aside && <div class="row aside">{aside}</div>}
       </header>
       {children}
     </section>
@@ -135,7 +135,7 @@ export function Panel({ title, aside, children, class: name }) {
 
 // The head of a view: its title, with links above it and a note and other content next to it.
 export const Heading = ({ title, crumbs, note, children }) => (
-  <div class="heading">
+  <div class="wrap heading">
     {crumbs && <p class="note crumbs">{crumbs}</p>}
     <h1>{title}</h1>
     {note && <span class="note">{note}</span>}

@@ -194,7 +194,7 @@ export function Adopt({ job }) {
     <>
       <Messages job={job} state={state} refusal={refusal} refused={refused} />
       {state.adopted === null && (
-        <div class="tools adopt">
+        <div class="row wrap tools adopt">
           {groups.map((g) => (
             <ChooseEffect
               key={g.id}

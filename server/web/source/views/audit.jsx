@@ -163,7 +163,7 @@ const columns = [
 // A log, of useNewest(), below its fields, as a List.
 const Log = ({ of, fields, ...list }) => (
   <>
-    <div class="filters">{fields}</div>
+    <div class="wrap filters">{fields}</div>
     <List of={of} {...list} />
     {of.value?.next && (
       <p class="fold">

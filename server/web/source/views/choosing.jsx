@@ -86,7 +86,7 @@ export function DayField({ label, value = '', onChange, minutes }) {
   return (
     <div class="field">
       <span>{label}</span>
-      <span class="with-unit">
+      <span class="row with-unit">
         <TypedInput
           type="text"
           class="date"
@@ -128,7 +128,7 @@ export function fieldsOf(given, change) {
 // The fields of a view, folded on a narrow screen.
 export function Filters({ label, children }) {
   const form = (
-    <form class="filters" aria-label={label} onSubmit={(event) => event.preventDefault()}>
+    <form class="wrap filters" aria-label={label} onSubmit={(event) => event.preventDefault()}>
       {children}
     </form>
   );
@@ -155,7 +155,7 @@ export function Several({ label, one, value, onChange, options, none }) {
   return (
     <div class="field">
       <span>{label}</span>
-      <span class="chips">
+      <span class="row wrap chips">
         {chosen.map((id) => (
           <button
             key={id}

@@ -62,14 +62,14 @@ export function Export({ of, total, disabled }) {
   };
   if (count !== null)
     return (
-      <div class="export" role="status">
+      <div class="row export" role="status">
         <progress max={total || undefined} value={total ? count : undefined} /> {format.fixed(count)}
         {total && ` of ${format.fixed(total)}`}
         <Button onClick={() => abort.current.abort()}>Stop</Button>
       </div>
     );
   return (
-    <div class="export">
+    <div class="row export">
       {error && (
         <span class="fault" role="alert">
           {error.message}

@@ -339,7 +339,7 @@ export function Fleet({ given: asked }) {
       <h1 class="hidden">Fleet</h1>
       <Summary robots={live.robots} attention={attention} />
       <Reasons of={attention.get('')} />
-      <div class="tools">
+      <div class="row wrap tools">
         <label class="find">
           <span class="hidden">Find a robot or mission</span>
           <input
@@ -357,7 +357,7 @@ export function Fleet({ given: asked }) {
         />
         <SortChoice columns={columns} sort={sort} onSort={onSort} />
         <Button href="#/robot-file">Add a robot</Button>
-        <span class="note key">
+        <span class="row note key">
           <Key of={{ measured: 'measured', modelled: 'modelled' }} />
         </span>
       </div>

@@ -45,7 +45,7 @@ function Progress({ job, onEnd }) {
         : 'about to start'
       : `${part} %${left}`;
   return (
-    <div class="progress">
+    <div class="row wrap progress">
       <label for="progress">
         Diagnosis {job.id} of {job.robot_id}: {stateNotes[now.state]}, {words}
       </label>
@@ -92,7 +92,7 @@ function Start({ given, onStart }) {
       </Empty>
     );
   return (
-    <form class="filters" onSubmit={start}>
+    <form class="wrap filters" onSubmit={start}>
       <Field label="Robot">
         <select value={chosen} onChange={(e) => setRobot(e.currentTarget.value)}>
           {[

@@ -59,7 +59,7 @@ function FloorPlanForm({ place, level, onChange }) {
     <details class="model">
       <summary>{level ? 'Replace or remove the floor plan' : 'Add a floor plan'}</summary>
       <Panel title="Floor plan">
-        <form class="filters" onSubmit={send}>
+        <form class="wrap filters" onSubmit={send}>
           {text('Map', 'map', name)}
           {text('Level', 'level', name)}
           <Field label="Image, PNG or SVG, at most 4 MB">
@@ -235,7 +235,7 @@ function Shown({ maps, given, change, reload }) {
         </Playback>
       ) : (
         <>
-          <div class="filters">{choice}</div>
+          <div class="wrap filters">{choice}</div>
           <Live
             maps={maps}
             place={place}

@@ -49,7 +49,7 @@ function BoundFields({ label, name, given, change, ...more }) {
   return (
     <fieldset class="field">
       <legend>{label}</legend>
-      <span class="with-unit">
+      <span class="row with-unit">
         {input('min', 'from')}
         {input('max', 'to')}
       </span>
@@ -117,7 +117,7 @@ function Totals({ of }) {
 function Loaded({ list, total }) {
   const of = total === null ? '' : ` of ${format.fixed(total)}`;
   return (
-    <nav class="pages" aria-label="More missions">
+    <nav class="row wrap pages" aria-label="More missions">
       <span role="status">
         {format.fixed(list.value.entries.length)}
         {of} loaded
@@ -173,7 +173,7 @@ export function Missions({ given: asked }) {
       ) : (
         <>
           <Totals of={totals} />
-          <div class="tools">
+          <div class="row wrap tools">
             <Button onClick={refresh}>Refresh</Button>
             <Button href={`#/trends${query({ robot: given.robot })}`}>Trends</Button>
             <Button href="#/trends?of=missions">Compare</Button>

@@ -101,7 +101,7 @@ export function DrawPath({ points, change }) {
         onPointerCancel={up}
         onKeyDown={key}
       />
-      <div class="tools">
+      <div class="row wrap tools">
         {button('Undo point', () => change(points.slice(0, -1)), points.length === 0)}
         {button('Clear', () => change([]), points.length === 0)}
         {button('+', () => setAcross(acrossM / 2), acrossM <= 4, 'Closer')}
@@ -138,7 +138,7 @@ function LegTools({ number, count, move, remove }) {
     </Button>
   );
   return (
-    <span class="leg-tools">
+    <span class="row leg-tools">
       {button('↑', `Move leg ${number} up`, number === 1, () => move(-1))}
       {button('↓', `Move leg ${number} down`, number === count, () => move(1))}
       {button('×', `Remove leg ${number}`, count === 1, remove)}
@@ -158,7 +158,7 @@ function Legs({ legs, change, fault }) {
       <legend>Legs</legend>
       <ol>
         {legs.map((leg, k) => (
-          <li key={k} class={fault === k ? 'faulty' : ''}>
+          <li key={k} class={fault === k ? 'row wrap faulty' : 'row wrap'}>
             <select
               aria-label={`Kind of leg ${k + 1}`}
               value={leg.kind}
@@ -202,7 +202,7 @@ function Terms({ given, change }) {
     <div class="terms">
       {terms.map(([key, label, unit, placeholder]) => (
         <Field key={key} label={label}>
-          <span class="with-unit">
+          <span class="row with-unit">
             <input
               type="number"
               step="any"

@@ -149,8 +149,8 @@ export function Front({ answer, take }) {
       <p class="note foot">
         <Key of={{ 'accent dot': 'this plan', modelled: 'cheapest for each duration' }} />
       </p>
-      <div class="front-pick">
-        <label>
+      <div class="row wrap front-pick">
+        <label class="row wrap">
           <span>Duration</span>
           <input
             type="range"

@@ -80,7 +80,7 @@ function Player({ second, most, change }) {
     setPlaying(!playing);
   };
   return (
-    <div class="player">
+    <div class="row wrap player">
       <Button onClick={toggle}>{playing ? 'Pause' : 'Play'}</Button>
       <input
         type="range"
@@ -138,7 +138,7 @@ export function Playback({ given, change, level, image, children }) {
   };
   return (
     <>
-      <div class="filters">
+      <div class="wrap filters">
         {first && <WithField of={first.mission} {...fieldsOf(given, change).of('with')} />}
         <Button onClick={() => change({ mission: '', robot: '', with: '' })}>Live robots</Button>
         {children}

@@ -128,7 +128,7 @@ function Head({ id, state }) {
   return (
     <Heading title={id} crumbs={<a href="#/fleet">Fleet</a>}>
       {state && (
-        <span class="health">
+        <span class="row wrap health">
           <Health state={state} />
         </span>
       )}

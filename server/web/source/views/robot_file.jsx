@@ -118,7 +118,7 @@ function FileField({ of, file, fixed, finding, onChange }) {
         {of.type === 'array' && ', right and left'}
         {!of.required && ' (optional)'}
       </span>
-      <span class="with-unit">
+      <span class="row with-unit">
         <Input
           of={of}
           value={value}
@@ -199,7 +199,7 @@ function Sources({ onFile, onError }) {
       onError,
     );
   return (
-    <div class="filters">
+    <div class="wrap filters">
       <Field label="Load a robot file">
         <input type="file" accept=".json,application/json" onChange={read} />
       </Field>
@@ -229,7 +229,7 @@ function Place({ id, onError }) {
   const name = { maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
   return (
     <Panel title="Map and level">
-      <div class="filters">
+      <div class="wrap filters">
         {text('Map', 'map', name)}
         {text('Level', 'level', name)}
         <Button needs="operate" onClick={save}>
@@ -350,7 +350,7 @@ function Form({ groups, id, stored, begun }) {
         <div class="beside">
           <Panel title="Review">
             {review && <Review of={review} file={file} />}
-            <p class="tools">
+            <p class="row wrap tools">
               <Save
                 name={name}
                 stored={stored}

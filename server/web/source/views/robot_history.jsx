@@ -44,7 +44,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
       <Changes of={changes} />
       {state.test && <BackTest test={state.test} />}
       {state.error && <Failure error={state.error} />}
-      <p class="tools">
+      <p class="row wrap tools">
         <TestButton
           busy={state.busy === 'test'}
           disabled={busy}

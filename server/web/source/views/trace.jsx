@@ -269,7 +269,7 @@ function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
 function ChartsAside({ zoomed, onWhole }) {
   return (
     <>
-      <span class="note key">
+      <span class="row note key">
         <Key of={{ measured: 'measured', modelled: 'modelled', band: 'minimum to maximum' }} />
       </span>
       {zoomed ? (

@@ -189,7 +189,7 @@ function Names({ series }) {
     'stroke-dasharray': dashes[k % dashes.length].join(' '),
   });
   return (
-    <p class="note key trend-key">
+    <p class="row wrap note key trend-key">
       {series.map((s, k) => (
         <span key={s.name}>
           <svg width="34" height="8" aria-hidden="true">
