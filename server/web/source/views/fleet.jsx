@@ -1,6 +1,7 @@
 import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
 import { get, query, useRenewed } from '../api.js';
-import { consumption, energy, energyIn, energyScale, perMetre, useTariff, worthTexts } from '../energy.js';
+import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
+import { useTariff, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
 import {
   Charge,

@@ -1,7 +1,8 @@
 // The fleet's energy by place on the floor over weeks, and its departure from the models.
 import { useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { consumption, energy, energyIn, energyScale, useTariff, worthTexts } from '../energy.js';
+import { consumption, energy, energyIn, energyScale } from '../energy.js';
+import { useTariff, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';

@@ -1,6 +1,7 @@
 import { useMemo } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { consumption, energy, useTariff, worthTexts } from '../energy.js';
+import { consumption, energy } from '../energy.js';
+import { useTariff, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';

@@ -4,17 +4,8 @@ import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
 import { Strips } from '../bars.jsx';
 import { Chart, axis, bars, dateAxis, line, timesWith, withGaps } from '../chart.jsx';
-import {
-  consumption,
-  energy,
-  energyIn,
-  energyScale,
-  perMetre,
-  useTariff,
-  worthNames,
-  worthOf,
-  worthTexts,
-} from '../energy.js';
+import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
+import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
 import { newest } from '../logs.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
