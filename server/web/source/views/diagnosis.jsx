@@ -4,14 +4,7 @@ import * as format from '../format.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
 import { unitOf } from './changes.jsx';
-import {
-  Comparison,
-  Conditions,
-  FloorFigure,
-  MissionFigures,
-  PowerFigure,
-  Runs,
-} from './diagnosis_figures.jsx';
+import * as figures from './diagnosis_figures.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdictTitle } from './jobs.jsx';
 
 const channels = {
@@ -238,16 +231,16 @@ function NextDrives({ result: r }) {
 }
 
 const floorOf = (r) =>
-  r.figures?.floor.x_m.length > 3 && <FloorFigure floor={r.figures.floor} effects={r.effects} />;
+  r.figures?.floor.x_m.length > 3 && <figures.FloorFigure floor={r.figures.floor} effects={r.effects} />;
 
 function Charts({ result: r }) {
   const f = r.figures;
   const after = r.effects.length > 0;
   return (
     <>
-      <Conditions maps={f.maps} after={after} />
-      {f.power.t_s.length > 4 && <PowerFigure power={f.power} after={after} />}
-      <MissionFigures missions={f.missions} total={r.missions} after={after} />
+      <figures.Conditions maps={f.maps} after={after} />
+      {f.power.t_s.length > 4 && <figures.PowerFigure power={f.power} after={after} />}
+      <figures.MissionFigures missions={f.missions} total={r.missions} after={after} />
     </>
   );
 }
@@ -314,8 +307,8 @@ export function Result({ result: r, children }) {
           </div>
         </div>
       )}
-      {r.groups && <Comparison of={r} />}
-      {r.runs && <Runs of={r} />}
+      {r.groups && <figures.Comparison of={r} />}
+      {r.runs && <figures.Runs of={r} />}
       {r.figures && <Charts result={r} />}
       {!placed && floorOf(r)}
       {r.channels && <Readings channels={r.channels} />}

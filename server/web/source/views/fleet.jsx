@@ -3,18 +3,7 @@ import { get, query, useRenewed } from '../api.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
 import { useTariff, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
-import {
-  Charge,
-  Health,
-  Reasons,
-  between,
-  lowCharge,
-  needsSomeone,
-  now,
-  powerNow,
-  unheard,
-  useAttention,
-} from '../health.jsx';
+import * as health from '../health.jsx';
 import { showRecent, useLive, useModelled } from '../live.js';
 import { useRatios } from '../models.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
@@ -41,7 +30,7 @@ const reorderMs = 3000;
 const todayMs = 60_000;
 const weekMs = 7 * 86_400_000;
 
-const speedNow = ({ state }) => now(state, state.speed_m_s);
+const speedNow = ({ state }) => health.now(state, state.speed_m_s);
 const timeOf = ({ state }) => state.run_time_s;
 const spentOf = ({ state }) => state.mission?.energy.battery_j;
 const severities = ['fault', 'warning', 'notice'];
@@ -56,7 +45,7 @@ function Power({ state: s }) {
   const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
   return (
     <>
-      <Quantity of={format.power(powerNow(s))} />
+      <Quantity of={format.power(health.powerNow(s))} />
       {modelledOnly && <span class="below">modelled</span>}
     </>
   );
@@ -65,7 +54,7 @@ function Power({ state: s }) {
 const Range = ({ state: s }) => (
   <>
     <Quantity of={format.kilometres(s.range_m)} />
-    <span class="below">{between(s.range_quantiles_m, format.lengthBand)}</span>
+    <span class="below">{health.between(s.range_quantiles_m, format.lengthBand)}</span>
   </>
 );
 
@@ -83,10 +72,17 @@ const hint = 'measured energy over modelled energy, median of the newest mission
 // Of rows {id, state, needs, ratio, entry, scale}.
 const columns = [
   ['robot', '11%', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
-  ['health', '', 'Attention', '', (r) => <Health state={r.state} reasons={r.needs?.reasons} />, urgency],
-  ['power', '96px', 'Power', 'figure', Power, (r) => powerNow(r.state)],
+  [
+    'health',
+    '',
+    'Attention',
+    '',
+    (r) => <health.Health state={r.state} reasons={r.needs?.reasons} />,
+    urgency,
+  ],
+  ['power', '96px', 'Power', 'figure', Power, (r) => health.powerNow(r.state)],
   ['spark', '148px', 'Last 90 s', '', ({ entry }) => <Sparkline track={entry.power} />],
-  ['charge', '116px', 'Charge', '', Charge, (r) => r.state.state_of_charge],
+  ['charge', '116px', 'Charge', '', health.Charge, (r) => r.state.state_of_charge],
   ['range', '104px', 'Range', 'figure', Range, (r) => r.state.range_m],
   ['time', '96px', 'Run time', 'figure wide', (r) => format.about(timeOf(r)), timeOf],
   ['speed', '84px', 'Speed', 'figure wide', (r) => format.unit(speedNow(r), 'm/s', 2), speedNow],
@@ -104,14 +100,14 @@ const columns = [
 
 const filters = {
   all: ['All', () => true],
-  attention: ['Need attention', (_, needs) => needsSomeone(needs)],
+  attention: ['Need attention', (_, needs) => health.needsSomeone(needs)],
   live: ['Live', (s) => s.live],
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
   charging: ['Charging', (s) => s.charging !== null],
   low: [
-    `Charge below ${100 * lowCharge}\u00a0%`,
-    (s) => s.state_of_charge !== null && s.state_of_charge < lowCharge,
+    `Charge below ${100 * health.lowCharge}\u00a0%`,
+    (s) => s.state_of_charge !== null && s.state_of_charge < health.lowCharge,
   ],
 };
 const filterNames = Object.fromEntries(Object.entries(filters).map(([key, [name]]) => [key, name]));
@@ -151,7 +147,7 @@ function useOrder(live, text, only, sort, attention, ratios) {
   const at = performance.now();
   const held = document.activeElement?.closest('.fleet tbody'); // a row that moves loses the focus
   if (kept.current.key !== key || (at - kept.current.at > reorderMs && !held)) {
-    const keep = only === 'heard' ? (s) => !unheard(s) : filters[only][1];
+    const keep = only === 'heard' ? (s) => !health.unheard(s) : filters[only][1];
     const rows = chosen(live.robots, text, keep, attention)
       .sort((a, b) => names.compare(a.id, b.id))
       .map((entry) => ({
@@ -163,7 +159,7 @@ function useOrder(live, text, only, sort, attention, ratios) {
       }));
     const ordered = sorted(rows, columns, sort);
     // Robots without telemetry come last in every order.
-    const heard = (wanted) => ordered.filter((r) => unheard(r.state) !== wanted);
+    const heard = (wanted) => ordered.filter((r) => health.unheard(r.state) !== wanted);
     kept.current = { key, at, rows: [...heard(true), ...heard(false)].map((r) => r.entry) };
   }
   return kept.current.rows;
@@ -244,7 +240,7 @@ function useTodayRow() {
 
 function Summary({ robots, attention }) {
   const t = totalsOf(robots);
-  const entries = [...attention.values()].filter(needsSomeone);
+  const entries = [...attention.values()].filter(health.needsSomeone);
   const counted = severities
     .map((severity) => [severity, entries.filter((e) => e.severity === severity).length])
     .filter(([, count]) => count > 0)
@@ -310,8 +306,8 @@ function QuietFold({ count, whole, onToggle }) {
 
 export function Fleet({ given: asked }) {
   const live = useLive();
-  const attention = useAttention();
-  const needing = [...attention.values()].filter(needsSomeone).length;
+  const attention = health.useAttention();
+  const needing = [...attention.values()].filter(health.needsSomeone).length;
   useTitleOf(needing > 0 ? `(${needing}) Fleet` : 'Fleet');
   const [given, change] = useChoices(asked);
   const { find: text = '' } = given;
@@ -320,7 +316,7 @@ export function Fleet({ given: asked }) {
   const [sort, onSort] = orderOf(known ? given : {}, change, { key: 'health', down: false });
   const [whole, setWhole] = useState(false);
   const ratios = useRatios(useModelled());
-  const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
+  const quiet = [...live.robots.values()].filter((entry) => health.unheard(entry.state)).length;
   const foldable = only === 'all' && text === '' && quiet > 0 && quiet < live.robots.size;
   const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort, attention, ratios);
   if (!live.loaded && live.robots.size === 0)
@@ -339,7 +335,7 @@ export function Fleet({ given: asked }) {
     <>
       <h1 class="hidden">Fleet</h1>
       <Summary robots={live.robots} attention={attention} />
-      <Reasons of={attention.get('')} />
+      <health.Reasons of={attention.get('')} />
       <div class="row wrap tools">
         <label class="find">
           <span class="hidden">Find a robot or mission</span>

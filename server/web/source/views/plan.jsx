@@ -1,15 +1,7 @@
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { idPath, post, useRead } from '../api.js';
 import { consumption, energy } from '../energy.js';
-import {
-  legsFrom,
-  legsText,
-  pathOfPoints,
-  pointsFrom,
-  pointsOfLegs,
-  pointsText,
-  segmentOf,
-} from '../drive_path.js';
+import * as drive from '../drive_path.js';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
@@ -30,8 +22,8 @@ function useQuestion(address, robots) {
   const [given, setGiven] = useState({
     robot: address.robot ?? '',
     way: address.points ? 'draw' : 'legs',
-    legs: legsFrom(address.path) ?? legsFrom(firstLegs),
-    points: pointsFrom(address.points) ?? pointsFrom(firstPoints),
+    legs: drive.legsFrom(address.path) ?? drive.legsFrom(firstLegs),
+    points: drive.pointsFrom(address.points) ?? drive.pointsFrom(firstPoints),
     payload: address.payload ?? '',
     deadline: address.deadline ?? '',
     value: address.value ?? '',
@@ -41,11 +33,11 @@ function useQuestion(address, robots) {
     const next = { ...given, ...part };
     setGiven(next);
     const { way, legs, points, ...terms } = next;
-    const path = legsText(legs);
+    const path = drive.legsText(legs);
     keepInAddress({
       ...terms,
       path: way === 'legs' && path !== firstLegs ? path : '',
-      points: way === 'draw' ? pointsText(points) : '',
+      points: way === 'draw' ? drive.pointsText(points) : '',
     });
   };
   return [{ ...given, robot: robots.includes(given.robot) ? given.robot : (robots[0] ?? '') }, change];
@@ -53,7 +45,7 @@ function useQuestion(address, robots) {
 
 function requestOf(given) {
   return {
-    ...(given.way === 'draw' ? pathOfPoints(given.points) : { path: given.legs.map(segmentOf) }),
+    ...(given.way === 'draw' ? drive.pathOfPoints(given.points) : { path: given.legs.map(drive.segmentOf) }),
     payload_kg: number(given.payload),
     deadline_s: number(given.deadline),
     value_of_time_w: number(given.value),
@@ -169,7 +161,9 @@ function Outdated({ onCompute }) {
 }
 
 const floorPath = (given) =>
-  given.way === 'legs' ? pointsOfLegs(given.legs).filter(([x, y]) => Number.isFinite(x + y)) : given.points;
+  given.way === 'legs'
+    ? drive.pointsOfLegs(given.legs).filter(([x, y]) => Number.isFinite(x + y))
+    : given.points;
 
 function ResultArea({ plan, given, change }) {
   const path = useMemo(() => floorPath(given), [given.way, given.legs, given.points]);

@@ -225,7 +225,6 @@ function Charts({ series, kind }) {
     },
     {
       title: 'Consumption',
-      label: 'Consumption',
       unit: perUnit,
       value: (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km),
       zero: true,
