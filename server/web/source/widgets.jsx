@@ -169,22 +169,6 @@ export function Choice({ label, options, value, onChange }) {
   );
 }
 
-// The states of missions, in the service's words.
-export const missionStates = {
-  open: 'not ended yet',
-  finished: 'ended by the robot',
-  aborted: 'ended early by the robot',
-  unfinished: 'its end was never reported',
-  superseded: 'another mission began before its end',
-  interrupted: 'the service was stopped',
-};
-
-export const MissionState = ({ mission: { state } }) => (
-  <span class={`state ${state}`} title={missionStates[state]}>
-    {state}
-  </span>
-);
-
 // Confines an error in one view to that view.
 export function Guard({ children }) {
   const [error, reset] = useErrorBoundary(console.error);

@@ -28,11 +28,6 @@ export const Misordered = () => (
   </p>
 );
 
-// Minutes that local time is ahead of UTC.
-export const offsetMin = () => -new Date().getTimezoneOffset();
-
-export const robotsOf = (given) => (given.robot ? given.robot.split(',') : []);
-
 export const Field = ({ label, children }) => (
   <label class="field">
     <span>{label}</span>

@@ -6,19 +6,9 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { robotLink } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import {
-  Answer,
-  Button,
-  Empty,
-  Facts,
-  Heading,
-  MissionState,
-  Panel,
-  Readouts,
-  Texts,
-  useTitleOf,
-} from '../widgets.jsx';
+import { Answer, Button, Empty, Facts, Heading, Panel, Readouts, Texts, useTitleOf } from '../widgets.jsx';
 import { LeastEnergy } from './least_energy.jsx';
+import { MissionState } from './mission_rows.jsx';
 import { TracePanels } from './trace.jsx';
 
 const joined = (parts) => parts.filter(Boolean).join(' · ');

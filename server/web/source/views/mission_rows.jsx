@@ -4,7 +4,23 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
-import { MissionState, Ratio } from '../widgets.jsx';
+import { Ratio } from '../widgets.jsx';
+
+// The states of missions, in the service's words.
+export const missionStates = {
+  open: 'not ended yet',
+  finished: 'ended by the robot',
+  aborted: 'ended early by the robot',
+  unfinished: 'its end was never reported',
+  superseded: 'another mission began before its end',
+  interrupted: 'the service was stopped',
+};
+
+export const MissionState = ({ mission: { state } }) => (
+  <span class={`state ${state}`} title={missionStates[state]}>
+    {state}
+  </span>
+);
 
 // The service's sort keys that differ from the column's key.
 export const sortNames = { consumption: 'wh_per_km' };

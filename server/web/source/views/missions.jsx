@@ -6,10 +6,10 @@ import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { useNewest } from '../logs.js';
 import { orderOf } from '../table.jsx';
-import { Answer, Button, Empty, Failure, Readouts, missionStates } from '../widgets.jsx';
+import { Answer, Button, Empty, Failure, Readouts } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, exportMissions } from './export.jsx';
-import { MissionTable, sortNames } from './mission_rows.jsx';
+import { MissionTable, missionStates, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;
 

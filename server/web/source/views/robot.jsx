@@ -4,17 +4,7 @@ import { ConfirmButton } from '../dialog.jsx';
 import { energy } from '../energy.js';
 import { FloorPath, powerAt, rowsOf } from '../floor.jsx';
 import * as format from '../format.js';
-import {
-  Health,
-  Reasons,
-  between,
-  chargeNote,
-  now,
-  powerNow,
-  since,
-  unheard,
-  useAttention,
-} from '../health.jsx';
+import * as health from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
@@ -76,22 +66,24 @@ function Now({ entry }) {
   const measured = s.measured_power_w !== null;
   const trace = <Sparkline track={entry.power} width={90} height={26} />;
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
-  const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
+  const note = [s.state_of_charge === null ? '' : health.chargeNote(s).text, voltage]
+    .filter(Boolean)
+    .join(' · ');
   const toCharge = s.charge.time_to_charged_s;
   const [right, left] = s.winding_temperature_c;
   const rows = [
     [
       measured ? 'Power' : 'Power (modelled)',
-      format.power(powerNow(s)),
+      format.power(health.powerNow(s)),
       trace,
       measured ? 'measured' : 'modelled',
     ],
     ['Charge', format.percent(s.state_of_charge), note],
-    ['Range', format.length(s.range_m), between(s.range_quantiles_m, format.lengthBand)],
-    ['Run time', format.about(s.run_time_s), between(s.run_time_quantiles_s, format.spanBand)],
+    ['Range', format.length(s.range_m), health.between(s.range_quantiles_m, format.lengthBand)],
+    ['Run time', format.about(s.run_time_s), health.between(s.run_time_quantiles_s, format.spanBand)],
     s.charging === null &&
       format.known(toCharge) && ['Time to charge', format.about(toCharge), 'if it started now'],
-    ['Speed', format.unit(now(s, s.speed_m_s), 'm/s', 2)],
+    ['Speed', format.unit(health.now(s, s.speed_m_s), 'm/s', 2)],
     ['Payload', format.unit(s.payload_kg, 'kg')],
     right !== null && ['Windings, right · left', `${format.fixed(right)} · ${format.fixed(left)} °C`],
     [
@@ -113,13 +105,13 @@ function Now({ entry }) {
 }
 
 function SilenceNote({ state }) {
-  if (unheard(state))
+  if (health.unheard(state))
     return <p class="note">No telemetry since the service started. Its history is below.</p>;
   if (state.live) return null;
   return (
     <p class="note">
-      Silent since {since(state.heardUs)}: its power and speed are unknown. The other values are the last ones
-      received.
+      Silent since {health.since(state.heardUs)}: its power and speed are unknown. The other values are the
+      last ones received.
     </p>
   );
 }
@@ -129,7 +121,7 @@ function Head({ id, state }) {
     <Heading title={id} crumbs={<a href="#/fleet">Fleet</a>}>
       {state && (
         <span class="row wrap health">
-          <Health state={state} />
+          <health.Health state={state} />
         </span>
       )}
       <span class="spring" />
@@ -221,11 +213,11 @@ export function Robot({ id }) {
   const live = useLive();
   const [turn, setTurn] = useState(0);
   const [failure, setFailure] = useState(null);
-  const attention = useAttention(turn);
+  const attention = health.useAttention(turn);
   const detail = useGet(`/v1/robots/${idPath(id)}`);
   const entry = live.robots.get(id);
   const s = entry?.state;
-  const heard = s && !unheard(s);
+  const heard = s && !health.unheard(s);
   useEffect(() => {
     if (entry) showRecent([entry]);
   }, [entry, live.loads]);
@@ -239,7 +231,7 @@ export function Robot({ id }) {
     <>
       <Head id={id} state={s} />
       {s && <SilenceNote state={s} />}
-      <Reasons
+      <health.Reasons
         of={attention.get(id)}
         more={(reason) => (
           <Acknowledge robot={id} reason={reason} onChange={() => setTurn(turn + 1)} onError={setFailure} />

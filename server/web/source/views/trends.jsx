@@ -13,17 +13,7 @@ import { Table, TablePanel, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
 import { effectOn, termName } from '../waterfall.jsx';
 import { Answer, Choice, Panel, Quantity, Ratio, Readouts } from '../widgets.jsx';
-import {
-  Filters,
-  Misordered,
-  Several,
-  SomeRobots,
-  fieldsOf,
-  misordered,
-  offsetMin,
-  robotsOf,
-  timesOf,
-} from './choosing.jsx';
+import { Filters, Misordered, Several, SomeRobots, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, saveText } from './export.jsx';
 
 const defaultDays = { day: 30, week: 182 };
@@ -393,7 +383,7 @@ export function Trends({ given: asked }) {
   const [given, set] = useChoices(asked);
   const kind = given.by === 'week' ? 'week' : 'day';
   const missions = given.of === 'missions';
-  const robots = robotsOf(given);
+  const robots = given.robot ? given.robot.split(',') : [];
   const ids = given.missions?.split(',') ?? [];
   const none = misordered(given.from, given.to) || misordered(given.from2, given.to2);
   const key = none ? '' : JSON.stringify([given, kind]);
@@ -402,7 +392,7 @@ export function Trends({ given: asked }) {
     robot_id: given.robot,
     ...periods[0],
     group_by: robots.length > 0 ? `robot,${kind}` : kind,
-    utc_offset_min: offsetMin(),
+    utc_offset_min: -new Date().getTimezoneOffset(),
   };
   const series = useRead((signal) => readSeries(summed, robots, signal), !missions && key);
   const sums = useRead((signal) => readSides(periods, robots, signal), !missions && key);
