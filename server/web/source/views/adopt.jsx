@@ -107,10 +107,21 @@ export function useAdoption(robot, begun = null) {
 }
 
 // Requests the back-test alone.
-export const TestButton = ({ busy, ...more }) => (
-  <Button needs="operate" {...more}>
-    {busy ? 'Testing …' : 'Test on other missions'}
+export const TestButton = ({ state: { busy }, ask, disabled }) => (
+  <Button needs="operate" disabled={disabled || busy !== ''} onClick={() => ask('test', { dry_run: true })}>
+    {busy === 'test' ? 'Testing …' : 'Test on other missions'}
   </Button>
+);
+
+// Adopts with the back-test; `children` describe the change.
+export const AdoptButton = ({ state: { busy }, action = 'Adopt', disabled, ...more }) => (
+  <ConfirmButton
+    label={busy === 'adopt' ? 'Testing and adopting …' : action}
+    action={action}
+    disabled={disabled || busy !== ''}
+    needs="operate"
+    {...more}
+  />
 );
 
 // One of several effects that the data do not distinguish.
@@ -169,15 +180,14 @@ export function Adopt({ job }) {
   const ask = (busy, more) =>
     askFor(busy, { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...more });
   const refused = state.error?.status === 409 && (state.error.body?.back_test ?? null) !== null;
-  const hold = state.busy !== '' || effect.includes('');
+  const unchosen = effect.includes('');
   const confirm = (label, name, more) => (
-    <ConfirmButton
-      label={state.busy === 'adopt' ? 'Testing and adopting …' : label}
+    <AdoptButton
+      state={state}
       action={label}
       class={name}
       title={`Change the model of ${job.robot_id}?`}
-      disabled={hold}
-      needs="operate"
+      disabled={unchosen}
       onConfirm={() => ask('adopt', more)}
     >
       <p>
@@ -188,7 +198,7 @@ export function Adopt({ job }) {
         . Every earlier version can be put in force again.
       </p>
       <Changes of={changesFor(job, robot.value, effect)} />
-    </ConfirmButton>
+    </AdoptButton>
   );
   return (
     <>
@@ -203,11 +213,7 @@ export function Adopt({ job }) {
               onChange={(id) => setChosen({ ...chosen, [g.id]: id })}
             />
           ))}
-          <TestButton
-            busy={state.busy === 'test'}
-            disabled={hold}
-            onClick={() => ask('test', { dry_run: true })}
-          />
+          <TestButton state={state} ask={ask} disabled={unchosen} />
           {!refusal && confirm('Adopt', 'primary', {})}
           {(refused || refusal) && confirm('Adopt anyway', '', { force: true })}
         </div>

@@ -9,7 +9,7 @@ import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { palette } from '../theme.js';
 import { Answer, Button, Empty, Failure, Key, List, Panel } from '../widgets.jsx';
-import { BackTest, TestButton, useAdoption } from './adopt.jsx';
+import { AdoptButton, BackTest, TestButton, useAdoption } from './adopt.jsx';
 import { Changes, changesOf } from './changes.jsx';
 import { origins } from './audit.jsx';
 import { JobRows, share } from './jobs.jsx';
@@ -32,7 +32,6 @@ function Proposal({ of: p, robot, inForce, onChange }) {
     if (await askFor(kind, { proposal_id: p.id, ...body })) onChange();
   };
   const changes = parameterChanges(p, inForce);
-  const busy = state.busy !== '';
   return (
     <li class="active">
       <p>
@@ -45,18 +44,11 @@ function Proposal({ of: p, robot, inForce, onChange }) {
       {state.test && <BackTest test={state.test} />}
       {state.error && <Failure error={state.error} />}
       <p class="row wrap tools">
-        <TestButton
-          busy={state.busy === 'test'}
-          disabled={busy}
-          onClick={() => ask('test', { dry_run: true })}
-        />
-        <ConfirmButton
-          label={state.busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}
-          action="Adopt"
+        <TestButton state={state} ask={ask} />
+        <AdoptButton
+          state={state}
           class="primary"
           title={`Adopt proposal ${p.id}?`}
-          disabled={busy}
-          needs="operate"
           onConfirm={() => ask('adopt', { expected_version: inForce.model_version })}
         >
           <p>
@@ -64,7 +56,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
             other missions shows an improvement:
           </p>
           <Changes of={changes} />
-        </ConfirmButton>
+        </AdoptButton>
       </p>
     </li>
   );
