@@ -1,6 +1,6 @@
 import { useMemo } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { consumption, energy } from '../energy.js';
+import { consumption, energy, perMetre } from '../energy.js';
 import { useTariff, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
@@ -91,22 +91,16 @@ function Totals({ of }) {
     <Answer of={of} what="totals">
       {(t) => {
         const e = t.energy;
-        const some = t.missions > 0;
         const incomplete =
           t.incomplete_missions > 0 ? `${format.fixed(t.incomplete_missions)} incomplete` : '';
         const part = e.unexplained_j !== null && e.battery_j !== 0 ? e.unexplained_j / e.battery_j : null;
         const rows = [
           ['Missions', format.fixed(t.missions), incomplete],
-          [
-            'Battery energy',
-            energy(some ? e.battery_j : null),
-            worthTexts(tariff, some ? e.battery_j : null).join(', '),
-            'measured',
-          ],
-          ['Modelled', energy(some ? e.modelled_j : null), '', 'modelled'],
+          ['Battery energy', energy(e.battery_j), worthTexts(tariff, e.battery_j).join(', '), 'measured'],
+          ['Modelled', energy(e.modelled_j), '', 'modelled'],
           ['Unexplained', energy(e.unexplained_j), part === null ? '' : format.share(part, 1), 'gap'],
           ['Distance', format.length(e.distance_m)],
-          ['Consumption', consumption(e.distance_m > 0 ? e.battery_j / e.distance_m : null)],
+          ['Consumption', consumption(perMetre(t))],
           ['Duration', format.span(e.duration_s)],
         ];
         return <Readouts rows={rows} />;
