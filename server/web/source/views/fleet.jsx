@@ -7,7 +7,6 @@ import * as health from '../health.jsx';
 import { showRecent, useLive, useModelled } from '../live.js';
 import { useRatios } from '../models.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
-import { Sparkline } from '../sparkline.jsx';
 import { Cells, Head, SortChoice, column, names, orderOf, sorted } from '../table.jsx';
 import {
   Button,
@@ -81,7 +80,7 @@ const columns = [
     urgency,
   ],
   ['power', '96px', 'Power', 'figure', Power, (r) => health.powerNow(r.state)],
-  ['spark', '148px', 'Last 90 s', '', ({ entry }) => <Sparkline track={entry.power} />],
+  ['spark', '148px', 'Last 90 s', '', ({ entry }) => <health.Sparkline track={entry.power} />],
   ['charge', '116px', 'Charge', '', health.Charge, (r) => r.state.state_of_charge],
   ['range', '104px', 'Range', 'figure', Range, (r) => r.state.range_m],
   ['time', '96px', 'Run time', 'figure wide', (r) => format.about(timeOf(r)), timeOf],

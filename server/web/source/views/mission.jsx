@@ -8,7 +8,7 @@ import { robotLink } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
 import { Answer, Button, Empty, Facts, Heading, Panel, Readouts, Texts, useTitleOf } from '../widgets.jsx';
 import { LeastEnergy } from './least_energy.jsx';
-import { MissionState } from './mission_rows.jsx';
+import { MissionState } from './missions.jsx';
 import { TracePanels } from './trace.jsx';
 
 const joined = (parts) => parts.filter(Boolean).join(' · ');

@@ -3,7 +3,6 @@ import { useRef, useState } from 'preact/hooks';
 import { legKinds, newLeg } from '../drive_path.js';
 import { FloorView, drawDot, drawRobot, placeIn, strokeThrough, viewOf } from '../floor.jsx';
 import * as format from '../format.js';
-import { digits } from '../format.js';
 import { palette } from '../theme.js';
 import { Button, Choice } from '../widgets.jsx';
 import { Field, NumberInput, fieldsOf } from './choosing.jsx';
@@ -94,7 +93,7 @@ export function DrawPath({ points, change }) {
         changes={[points, acrossM, cross]}
         role="application"
         tabindex="0"
-        aria-label={`Drawing of the path, ${points.length} points. Arrow keys move the cross, Enter adds a point, Backspace removes the last.${cross ? ` Cross at ${digits(cross[0], 3)}, ${digits(cross[1], 3)} metres.` : ''}`}
+        aria-label={`Drawing of the path, ${points.length} points. Arrow keys move the cross, Enter adds a point, Backspace removes the last.${cross ? ` Cross at ${format.digits(cross[0], 3)}, ${format.digits(cross[1], 3)} metres.` : ''}`}
         onPointerDown={down}
         onPointerMove={move}
         onPointerUp={up}

@@ -7,13 +7,12 @@ import * as format from '../format.js';
 import * as health from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
-import { Sparkline } from '../sparkline.jsx';
 import { Button, Empty, Facts, Failure, Heading, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { flat } from './changes.jsx';
 import { Field } from './choosing.jsx';
 import { Events, useEvents } from './audit.jsx';
 import { ownPart } from './fleet.jsx';
-import { MissionTable } from './mission_rows.jsx';
+import { MissionTable } from './missions.jsx';
 import { Proposals, RobotHistory } from './robot_history.jsx';
 
 const recentRows = 12;
@@ -64,7 +63,7 @@ function LiveMap({ entry }) {
 function Now({ entry }) {
   const s = entry.state;
   const measured = s.measured_power_w !== null;
-  const trace = <Sparkline track={entry.power} width={90} height={26} />;
+  const trace = <health.Sparkline track={entry.power} width={90} height={26} />;
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
   const note = [s.state_of_charge === null ? '' : health.chargeNote(s).text, voltage]
     .filter(Boolean)
