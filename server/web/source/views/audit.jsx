@@ -99,12 +99,12 @@ const eventColumns = [
   column('time', 'Time', (e) => format.time(e.utime_us), { class: 'when' }),
   column('robot', 'Robot', (e) => (e.robot_id ? <a href={robotLink(e.robot_id)}>{e.robot_id}</a> : '–')),
   column('what', 'What', titleOf, { head: true }),
-  column('detail', 'EventDetail', (e) => <EventDetail of={e} />, { class: 'words' }),
+  column('detail', 'Detail', (e) => <EventDetail of={e} />, { class: 'words' }),
 ];
 
 export function Events({ events, withRobot = true }) {
   const shown = eventColumns.filter(({ key }) => withRobot || key !== 'robot');
-  return <Table class="events" eventColumns={shown} rows={events} keyOf={(e) => e.id} />;
+  return <Table class="events" columns={shown} rows={events} keyOf={(e) => e.id} />;
 }
 
 // As useNewest(): of a robot, or of all.

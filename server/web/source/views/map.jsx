@@ -163,7 +163,7 @@ function Playback({ given, change, level, image, children }) {
         <Player second={second} most={most} change={setSecond} />
         <Table
           class="played"
-          playedColumns={playedColumns}
+          columns={playedColumns}
           rows={played.map((of, k) => ({ of, colour: colours[k], k: lastAt(of.t, second) }))}
         />
       </Panel>
