@@ -1,6 +1,6 @@
 // Bundles source/ into the files that joulecastd embeds. With --check: fails when they are not what the
-// sources give. With --watch: bundles again on every change.
-import { build, context } from 'esbuild-wasm';
+// sources give.
+import { build } from 'esbuild-wasm';
 import { readFile, writeFile } from 'node:fs/promises';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
@@ -107,8 +107,7 @@ async function put(files) {
   }
 }
 
-const mode = process.argv[2];
-if (mode === '--check') {
+if (process.argv[2] === '--check') {
   const stale = [];
   for (const [name, bytes] of await products()) {
     const present = await readFile(path.join(here, name)).catch(() => Buffer.alloc(0));
@@ -119,9 +118,6 @@ if (mode === '--check') {
     process.exit(1);
   }
   console.log('the built page is what the sources give');
-} else if (mode === '--watch') {
-  const rebuild = { name: 'put', setup: (b) => b.onEnd(async () => put(await products())) };
-  await (await context({ ...options, plugins: [help, rebuild] })).watch();
 } else {
   await put(await products());
 }
