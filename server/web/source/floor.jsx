@@ -126,9 +126,9 @@ export function drawRobot(c, view, x, y, heading, colour) {
   c.restore();
 }
 
-// A canvas to scale with grid and scale bar, which fills its box at the screen's density. `draw(context, view)`
-// draws between them in the view that `viewFor(width, height)` gives; `onPlace(x m, y m, view, event)` is called
-// where the pointer moves or clicks.
+// A canvas to scale with grid and scale bar, which fills its box at the screen's density. Between them
+// `draw(context, view)` draws in the view that `viewFor(width, height)` gives; `onPlace(x m, y m, view,
+// event)` is called where the pointer moves or clicks.
 export function FloorView({ viewFor, draw, under = drawGrid, onPlace, height, changes, children, ...more }) {
   const canvas = useRef(null);
   const view = useRef(null);
