@@ -5,6 +5,14 @@
 
 namespace joulecast::virtual_robot {
 
+extern const std::string_view amr_json, nomad_json, tug_json, p3dx_json;  // deploy/robots, embedded at build
+
+std::span<const ShippedRobot> shipped_robots() {
+  static const ShippedRobot robots[] = {
+      {"amr", amr_json}, {"nomad", nomad_json}, {"tug", tug_json}, {"p3dx", p3dx_json}};
+  return robots;
+}
+
 World draw_world(Rng& rng, double map_half_width_m) {
   World world;
   world.zone_x_m = rng.uniform(-0.5, 0.5) * map_half_width_m;

@@ -156,7 +156,6 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
   return {};
 }
 
-extern const std::string_view store_sql;             // schemas/store.sql, embedded at build
 extern const std::string_view postgres_store_sql;    // schemas/store.postgresql.sql
 extern const std::string_view postgres_cluster_sql;  // schemas/cluster.postgresql.sql
 

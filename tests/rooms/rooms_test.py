@@ -25,7 +25,7 @@ PRODUCTS = ("src", "server", "client", "tests/study")
 class Library:
     def __init__(self, name, folder):
         self.name, self.folder = name, folder
-        self.sources, self.links = set(), {"PUBLIC": set(), "PRIVATE": set()}
+        self.links = {"PUBLIC": set(), "PRIVATE": set()}
 
     def __repr__(self):
         return f"{self.folder} ({self.name})"
@@ -41,8 +41,7 @@ def libraries_of(source):
         made += [(a[0], a[2:]) for a in calls(text, "add_library") if a[0].startswith("joulecast_") and "$" not in a[0]]
         for name, sources in made:
             library = libraries[name] = Library(name, folder.relative_to(source))
-            library.sources = {folder / s for s in sources if s.endswith(".cc") and "$" not in s}
-            for s in library.sources:
+            for s in {folder / s for s in sources if s.endswith(".cc") and "$" not in s}:
                 owner[s] = owner[s.with_suffix(".h")] = library
         for name, *words in calls(text, "target_link_libraries"):
             scope = None
@@ -51,6 +50,12 @@ def libraries_of(source):
                     scope = word
                 elif name in libraries and word.startswith("joulecast_") and word != "joulecast_options":
                     libraries[name].links[scope].add(word)
+    # A source that no list names belongs to the library of its folder's name.
+    for file in [s for top in PRODUCTS for s in (source / top).rglob("*.cc") if s not in owner and s.name != "main.cc"]:
+        folder = next(f for f in file.parents if f == source or (f / "CMakeLists.txt").exists())
+        library = libraries.get(f"joulecast_{folder.name}")
+        if library and source / library.folder == folder:
+            owner[file] = owner[file.with_suffix(".h")] = library
     # A header without a source belongs to the library of its name, or else of its folder's.
     for header in [h for top in PRODUCTS for h in (source / top).rglob("*.h") if h not in owner]:
         folder = next(f for f in header.parents if f == source or (f / "CMakeLists.txt").exists())
