@@ -24,6 +24,11 @@ const std::vector<std::pair<double, double>> relative_curve{{0.0, 0.84},  {0.05,
                                                             {0.35, 0.99}, {0.6, 1.01},  {0.8, 1.03},
                                                             {0.95, 1.05}, {1.0, 1.08}};
 
+template <class T>
+void move_weighted(T& state, const T& a, const T& b, const T& c, const T& d, double step_s) {
+  state = moved(moved(moved(moved(state, a, step_s / 6), b, step_s / 3), c, step_s / 3), d, step_s / 6);
+}
+
 }  // namespace
 
 struct Plant::Rates {
@@ -253,15 +258,6 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
                                  inverse_inertia_[1][0] * net_nm[0] + inverse_inertia_[1][1] * net_nm[1]};
   return out;
 }
-
-namespace {
-
-template <class T>
-void move_weighted(T& state, const T& a, const T& b, const T& c, const T& d, double step_s) {
-  state = moved(moved(moved(moved(state, a, step_s / 6), b, step_s / 3), c, step_s / 3), d, step_s / 6);
-}
-
-}  // namespace
 
 void Plant::advance(const std::array<double, 2>& voltage_v, double step_s) {
   const Rates a = rates(state_, voltage_v);

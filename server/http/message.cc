@@ -22,6 +22,27 @@ auto value_in(const List& list, std::string_view name, Same same) -> decltype(&l
   return found != list.end() ? &found->second : nullptr;
 }
 
+class Generator : public StreamSource {
+ public:
+  explicit Generator(std::function<bool(std::string&, const std::stop_token&)> next)
+      : next_(std::move(next)) {}
+  Next pull(std::string& out) override {
+    if (left_.stop_requested()) return Next::abort;
+    try {
+      return next_(out, left_.get_token()) ? Next::more : Next::end;
+    } catch (...) {
+      // The head has been sent with status 200; only a broken connection can indicate the error to the
+      // client.
+      return Next::abort;
+    }
+  }
+  void cancel() override { left_.request_stop(); }
+
+ private:
+  std::function<bool(std::string&, const std::stop_token&)> next_;
+  std::stop_source left_;
+};
+
 }  // namespace
 
 const std::string& Request::param(std::string_view name) const {
@@ -69,31 +90,6 @@ Response json_response(std::string body) {
   response.body = std::move(body);
   return response;
 }
-
-namespace {
-
-class Generator : public StreamSource {
- public:
-  explicit Generator(std::function<bool(std::string&, const std::stop_token&)> next)
-      : next_(std::move(next)) {}
-  Next pull(std::string& out) override {
-    if (left_.stop_requested()) return Next::abort;
-    try {
-      return next_(out, left_.get_token()) ? Next::more : Next::end;
-    } catch (...) {
-      // The head has been sent with status 200; only a broken connection can indicate the error to the
-      // client.
-      return Next::abort;
-    }
-  }
-  void cancel() override { left_.request_stop(); }
-
- private:
-  std::function<bool(std::string&, const std::stop_token&)> next_;
-  std::stop_source left_;
-};
-
-}  // namespace
 
 std::shared_ptr<StreamSource> generate(
     std::function<bool(std::string& out, const std::stop_token& left)> next) {

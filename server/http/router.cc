@@ -115,6 +115,21 @@ std::string field_of(const Endpoint& endpoint, const Request& request, const Err
   return field;
 }
 
+// Depth-first with literal children first, so that "/v1/missions/latest" wins over "/v1/missions/{id}".
+template <class Node>
+const Node* descend(const Node& node, const std::vector<std::string>& segments, std::size_t at,
+                    std::vector<const std::string*>& captured) {
+  if (at == segments.size()) return node.slots.empty() ? nullptr : &node;
+  if (const auto child = node.children.find(segments[at]); child != node.children.end())
+    if (const Node* found = descend(*child->second, segments, at + 1, captured)) return found;
+  if (node.any && !segments[at].empty()) {
+    captured.push_back(&segments[at]);
+    if (const Node* found = descend(*node.any, segments, at + 1, captured)) return found;
+    captured.pop_back();
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 struct Router::Node {
@@ -173,25 +188,6 @@ Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault, Guard guard)
 }
 
 Router::~Router() = default;
-
-namespace {
-
-// Depth-first with literal children first, so that "/v1/missions/latest" wins over "/v1/missions/{id}".
-template <class Node>
-const Node* descend(const Node& node, const std::vector<std::string>& segments, std::size_t at,
-                    std::vector<const std::string*>& captured) {
-  if (at == segments.size()) return node.slots.empty() ? nullptr : &node;
-  if (const auto child = node.children.find(segments[at]); child != node.children.end())
-    if (const Node* found = descend(*child->second, segments, at + 1, captured)) return found;
-  if (node.any && !segments[at].empty()) {
-    captured.push_back(&segments[at]);
-    if (const Node* found = descend(*node.any, segments, at + 1, captured)) return found;
-    captured.pop_back();
-  }
-  return nullptr;
-}
-
-}  // namespace
 
 Router::Match Router::match(Request& request) const {
   request.path_params.clear();

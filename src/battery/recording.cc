@@ -64,6 +64,58 @@ Result<std::vector<std::optional<std::size_t>>> positions(std::string_view heade
   return found;
 }
 
+namespace fs = std::filesystem;
+
+constexpr std::string_view random_ending = "_rw.csv", test_ending = "_data.csv";
+
+// The CSV files of a folder, or those with a common beginning of their names; sorted.
+Result<std::vector<fs::path>> files_of(const std::string& folder_or_prefix) {
+  std::error_code ignored;
+  const bool whole_folder = fs::is_directory(folder_or_prefix, ignored);
+  const fs::path prefix(folder_or_prefix);
+  const fs::path folder = whole_folder               ? prefix
+                          : prefix.has_parent_path() ? prefix.parent_path()
+                                                     : fs::path(".");
+  std::string start = whole_folder ? "" : prefix.filename().string();
+  if (!whole_folder && !start.ends_with('_')) start += '_';
+  std::vector<fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(start) && name.ends_with(".csv")) found.push_back(entry.path());
+  }
+  if (found.empty() || (!whole_folder && start == "_"))
+    return fail(Fault::not_found, folder_or_prefix,
+                "is no file, no folder with CSV files, and begins no name of the form <beginning>_*.csv");
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+bool ends_with(const fs::path& file, std::string_view ending) {
+  return file.filename().string().ends_with(ending);
+}
+
+// A folder's files must be one battery's, which their names begin with.
+Result<std::vector<fs::path>> of_one_battery(const std::string& folder_or_prefix,
+                                             std::vector<fs::path> found) {
+  std::error_code ignored;
+  if (!fs::is_directory(folder_or_prefix, ignored)) return found;
+  const auto battery = [](const fs::path& file) {
+    const std::string name = file.filename().string();
+    return name.substr(0, name.find('_'));
+  };
+  if (battery(found.front()) == battery(found.back())) return found;
+  return invalid(
+      folder_or_prefix,
+      fmt::format("holds tests of several batteries, {} to {}: name one by the beginning of its files, as {}",
+                  battery(found.front()), battery(found.back()),
+                  (fs::path(folder_or_prefix) / battery(found.front())).string()));
+}
+
+bool stands_for_itself(const std::string& file) {
+  std::error_code ignored;
+  return fs::exists(file, ignored) && !fs::is_directory(file, ignored);
+}
+
 }  // namespace
 
 double Recording::charge_ah() const {
@@ -144,62 +196,6 @@ Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path
     return error;
   });
 }
-
-namespace {
-
-namespace fs = std::filesystem;
-
-constexpr std::string_view random_ending = "_rw.csv", test_ending = "_data.csv";
-
-// The CSV files of a folder, or those with a common beginning of their names; sorted.
-Result<std::vector<fs::path>> files_of(const std::string& folder_or_prefix) {
-  std::error_code ignored;
-  const bool whole_folder = fs::is_directory(folder_or_prefix, ignored);
-  const fs::path prefix(folder_or_prefix);
-  const fs::path folder = whole_folder               ? prefix
-                          : prefix.has_parent_path() ? prefix.parent_path()
-                                                     : fs::path(".");
-  std::string start = whole_folder ? "" : prefix.filename().string();
-  if (!whole_folder && !start.ends_with('_')) start += '_';
-  std::vector<fs::path> found;
-  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with(start) && name.ends_with(".csv")) found.push_back(entry.path());
-  }
-  if (found.empty() || (!whole_folder && start == "_"))
-    return fail(Fault::not_found, folder_or_prefix,
-                "is no file, no folder with CSV files, and begins no name of the form <beginning>_*.csv");
-  std::sort(found.begin(), found.end());
-  return found;
-}
-
-bool ends_with(const fs::path& file, std::string_view ending) {
-  return file.filename().string().ends_with(ending);
-}
-
-// A folder's files must be one battery's, which their names begin with.
-Result<std::vector<fs::path>> of_one_battery(const std::string& folder_or_prefix,
-                                             std::vector<fs::path> found) {
-  std::error_code ignored;
-  if (!fs::is_directory(folder_or_prefix, ignored)) return found;
-  const auto battery = [](const fs::path& file) {
-    const std::string name = file.filename().string();
-    return name.substr(0, name.find('_'));
-  };
-  if (battery(found.front()) == battery(found.back())) return found;
-  return invalid(
-      folder_or_prefix,
-      fmt::format("holds tests of several batteries, {} to {}: name one by the beginning of its files, as {}",
-                  battery(found.front()), battery(found.back()),
-                  (fs::path(folder_or_prefix) / battery(found.front())).string()));
-}
-
-bool stands_for_itself(const std::string& file) {
-  std::error_code ignored;
-  return fs::exists(file, ignored) && !fs::is_directory(file, ignored);
-}
-
-}  // namespace
 
 Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix) {
   if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};

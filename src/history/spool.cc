@@ -76,6 +76,34 @@ Result<void> write_whole(const std::string& path, const Bytes& bytes) {
   return done;
 }
 
+Result<TakenSpool> take_in(const std::string& path, Store& store,
+                           const std::function<void(const Error&)>& refused) {
+  TakenSpool taken;
+  if (!std::filesystem::exists(path)) return taken;
+  const Result<std::vector<Command>> commands = read_spool(path);
+  if (!commands && commands.error().fault == Fault::corrupt) return refuse_spool(path, commands.error());
+  if (!commands) return tl::unexpected(commands.error());
+  taken.commands = commands->size() - 1;
+  const std::uint64_t fenced = store.fenced(), samples = store.fenced_samples();
+  TRY_ASSIGN(const auto outcomes, store.apply(*commands));
+  const Outcome& first = outcomes.front();
+  taken.before = !first && first.error().fault == Fault::invalid;
+  if (!first && !taken.before) return refuse_spool(path, first.error());
+  if (!taken.before) {
+    taken.already = static_cast<std::size_t>(*first);
+    taken.fenced = store.fenced() - fenced;
+    taken.samples = store.fenced_samples() - samples;
+    for (const Outcome& outcome : outcomes)
+      if (!outcome) ++taken.refused, refused(outcome.error());
+  }
+  if (taken.refused + taken.fenced > 0) {
+    TRY_ASSIGN(taken.kept_as, put_aside(path));
+  } else if (unlink(path.c_str()) != 0) {
+    return trouble(path, "is stored and cannot be removed");
+  }
+  return taken;
+}
+
 }  // namespace
 
 Bytes command_bytes(std::span<const Command* const> commands) {
@@ -143,38 +171,6 @@ Result<std::vector<Command>> read_spool(const std::string& path) {
   first->hash = access::sha256_hex(text);
   return std::move(*commands);
 }
-
-namespace {
-
-Result<TakenSpool> take_in(const std::string& path, Store& store,
-                           const std::function<void(const Error&)>& refused) {
-  TakenSpool taken;
-  if (!std::filesystem::exists(path)) return taken;
-  const Result<std::vector<Command>> commands = read_spool(path);
-  if (!commands && commands.error().fault == Fault::corrupt) return refuse_spool(path, commands.error());
-  if (!commands) return tl::unexpected(commands.error());
-  taken.commands = commands->size() - 1;
-  const std::uint64_t fenced = store.fenced(), samples = store.fenced_samples();
-  TRY_ASSIGN(const auto outcomes, store.apply(*commands));
-  const Outcome& first = outcomes.front();
-  taken.before = !first && first.error().fault == Fault::invalid;
-  if (!first && !taken.before) return refuse_spool(path, first.error());
-  if (!taken.before) {
-    taken.already = static_cast<std::size_t>(*first);
-    taken.fenced = store.fenced() - fenced;
-    taken.samples = store.fenced_samples() - samples;
-    for (const Outcome& outcome : outcomes)
-      if (!outcome) ++taken.refused, refused(outcome.error());
-  }
-  if (taken.refused + taken.fenced > 0) {
-    TRY_ASSIGN(taken.kept_as, put_aside(path));
-  } else if (unlink(path.c_str()) != 0) {
-    return trouble(path, "is stored and cannot be removed");
-  }
-  return taken;
-}
-
-}  // namespace
 
 Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
                                  const std::function<void(const Error&)>& refused) {

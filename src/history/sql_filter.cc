@@ -34,6 +34,8 @@ Result<void> check_bounds(const std::string& field, const std::string& other, st
   return {};
 }
 
+constexpr std::size_t digits = 16;  // of a number
+
 }  // namespace
 
 std::string among(const std::string& column, std::size_t values) {
@@ -125,12 +127,6 @@ Result<void> check_filter(const MissionFilter& f) {
   TRY(check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg));
   return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
 }
-
-namespace {
-
-constexpr std::size_t digits = 16;  // of a number
-
-}  // namespace
 
 std::string encode_cursor(std::string_view query, CursorPlace place) {
   const std::string numbers = fmt::format("{:016x}{:016x}", static_cast<std::uint64_t>(place[0]),

@@ -96,59 +96,6 @@ Totals read_totals(Rows& rows) {
   return t;
 }
 
-}  // namespace
-
-Result<Mission> Store::mission(MissionKey key) const {
-  return read([&](Database& database) -> Result<Mission> {
-    TRY_ASSIGN(auto found, select_one<Mission>(database, "FROM mission WHERE mission_key = ?", key));
-    if (!found) return no_mission(key);
-    return std::move(*found);
-  });
-}
-
-Result<MissionPage> Store::missions(const MissionFilter& filter, const PageRequest& page,
-                                    MissionSort sort) const {
-  return read([&](Database& database) -> Result<MissionPage> {
-    TRY(check_filter(filter));
-    TRY(check_limit("limit", page.limit, max_page_size));
-    const Where where(filter);
-    const Column& column = column_of(sort.by);
-    const std::string direction = sort.ascending ? " ASC" : " DESC";
-    const std::string query = "missions by " + column.sql + direction + where.identity();
-    std::optional<Behind> behind;
-    if (!page.cursor.empty()) {
-      TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
-      if (column.kind == Kind::text && !has_mission(database, (place)[1]))
-        return invalid("cursor", "the mission at which the page before ended is gone: begin again");
-      behind.emplace(column, sort.ascending, place);
-    }
-    const std::string sql = "SELECT " + columns_of<Mission>() + ", " + column.sql + " FROM mission" +
-                            where.sql() + (behind ? behind->sql() : "") + " ORDER BY " +
-                            (column.kind == Kind::real ? column.sql + " IS NULL, " : "") + column.sql +
-                            direction + ", mission_key" + direction + " LIMIT ?";
-    const auto statement = database.prepare(sql);
-    Rows rows(*statement);
-    where.bind(rows);
-    if (behind) behind->bind(rows);
-    // One more than the limit, to detect a following page.
-    rows.bind(page.limit + 1);
-    MissionPage result;
-    CursorPlace last{};
-    while (rows.next()) {
-      if (static_cast<std::int64_t>(result.missions.size()) == page.limit) {
-        result.next_cursor = encode_cursor(query, last);
-        break;
-      }
-      TRY_ASSIGN(Mission read, read_record<Mission>(rows));
-      last = place_of(rows, column.kind, read.key);
-      result.missions.push_back(std::move(read));
-    }
-    return result;
-  });
-}
-
-namespace {
-
 // Missions to be summed: "FROM ... WHERE ...", with its parameters.
 class Summed {
  public:
@@ -223,6 +170,55 @@ class Summed {
 };
 
 }  // namespace
+
+Result<Mission> Store::mission(MissionKey key) const {
+  return read([&](Database& database) -> Result<Mission> {
+    TRY_ASSIGN(auto found, select_one<Mission>(database, "FROM mission WHERE mission_key = ?", key));
+    if (!found) return no_mission(key);
+    return std::move(*found);
+  });
+}
+
+Result<MissionPage> Store::missions(const MissionFilter& filter, const PageRequest& page,
+                                    MissionSort sort) const {
+  return read([&](Database& database) -> Result<MissionPage> {
+    TRY(check_filter(filter));
+    TRY(check_limit("limit", page.limit, max_page_size));
+    const Where where(filter);
+    const Column& column = column_of(sort.by);
+    const std::string direction = sort.ascending ? " ASC" : " DESC";
+    const std::string query = "missions by " + column.sql + direction + where.identity();
+    std::optional<Behind> behind;
+    if (!page.cursor.empty()) {
+      TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
+      if (column.kind == Kind::text && !has_mission(database, (place)[1]))
+        return invalid("cursor", "the mission at which the page before ended is gone: begin again");
+      behind.emplace(column, sort.ascending, place);
+    }
+    const std::string sql = "SELECT " + columns_of<Mission>() + ", " + column.sql + " FROM mission" +
+                            where.sql() + (behind ? behind->sql() : "") + " ORDER BY " +
+                            (column.kind == Kind::real ? column.sql + " IS NULL, " : "") + column.sql +
+                            direction + ", mission_key" + direction + " LIMIT ?";
+    const auto statement = database.prepare(sql);
+    Rows rows(*statement);
+    where.bind(rows);
+    if (behind) behind->bind(rows);
+    // One more than the limit, to detect a following page.
+    rows.bind(page.limit + 1);
+    MissionPage result;
+    CursorPlace last{};
+    while (rows.next()) {
+      if (static_cast<std::int64_t>(result.missions.size()) == page.limit) {
+        result.next_cursor = encode_cursor(query, last);
+        break;
+      }
+      TRY_ASSIGN(Mission read, read_record<Mission>(rows));
+      last = place_of(rows, column.kind, read.key);
+      result.missions.push_back(std::move(read));
+    }
+    return result;
+  });
+}
 
 Result<Totals> Store::totals(const MissionFilter& filter) const {
   return read([&](Database& database) -> Result<Totals> {

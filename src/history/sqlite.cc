@@ -121,6 +121,15 @@ class SqliteStatement final : public Statement {
   sqlite3_stmt* handle_ = nullptr;
 };
 
+// ", process 123", which the file contains; empty without it.
+std::string holder_of(int descriptor) {
+  std::array<char, 16> text{};
+  int process = 0;
+  if (const auto size = pread(descriptor, text.data(), text.size(), 0); size > 0)
+    std::from_chars(text.data(), text.data() + size, process);
+  return process > 0 ? " (process " + std::to_string(process) + ")" : "";
+}
+
 }  // namespace
 
 SqliteDatabase::SqliteDatabase(const std::string& path, OpenMode mode, std::int64_t busy_timeout_ms) {
@@ -172,19 +181,6 @@ void SqliteDatabase::commit() {
 void SqliteDatabase::roll_back() {
   Rows(statement("ROLLBACK")).run();
 }
-
-namespace {
-
-// ", process 123", which the file contains; empty without it.
-std::string holder_of(int descriptor) {
-  std::array<char, 16> text{};
-  int process = 0;
-  if (const auto size = pread(descriptor, text.data(), text.size(), 0); size > 0)
-    std::from_chars(text.data(), text.data() + size, process);
-  return process > 0 ? " (process " + std::to_string(process) + ")" : "";
-}
-
-}  // namespace
 
 FileLock::~FileLock() {
   close(descriptor_);
