@@ -139,6 +139,16 @@ std::string with_values(const std::string& yaml,
   return out;
 }
 
+// The energy of a drive in joules by RMF's model.
+double rmf_energy_j(const RmfParameters& p, const RmfDrive& d) {
+  return p.mass * d.speeding + p.moment_of_inertia * d.swerving +
+         p.friction_coefficient * p.mass * rmf_gravity_m_s2 * d.distance_m + p.ambient_power * d.duration_s;
+}
+
+RmfError rmf_error(const RmfParameters& parameters, std::span<const std::vector<RmfDrive>> missions) {
+  return error_by(missions, [&](const RmfDrive& drive) { return rmf_energy_j(parameters, drive); });
+}
+
 }  // namespace
 
 const std::vector<RmfPlace>& rmf_places() {
@@ -183,15 +193,6 @@ std::vector<RmfDrive> rmf_drives(const RmfTelemetry& telemetry, double wheel_rad
   }
   if (!drives.empty() && !complete) drives.pop_back();
   return drives;
-}
-
-double rmf_energy_j(const RmfParameters& p, const RmfDrive& d) {
-  return p.mass * d.speeding + p.moment_of_inertia * d.swerving +
-         p.friction_coefficient * p.mass * rmf_gravity_m_s2 * d.distance_m + p.ambient_power * d.duration_s;
-}
-
-RmfError rmf_error(const RmfParameters& parameters, std::span<const std::vector<RmfDrive>> missions) {
-  return error_by(missions, [&](const RmfDrive& drive) { return rmf_energy_j(parameters, drive); });
 }
 
 Result<RmfFit> fit_rmf(const std::vector<std::vector<RmfDrive>>& missions, double capacity_ah,

@@ -48,17 +48,11 @@ struct RmfTelemetry {
 [[nodiscard]] std::vector<RmfDrive> rmf_drives(const RmfTelemetry& telemetry, double wheel_radius_m,
                                                double half_track_m);
 
-// The energy of a drive in joules by RMF's model.
-[[nodiscard]] double rmf_energy_j(const RmfParameters& parameters, const RmfDrive& drive);
-
 // Errors of the energy of missions, relative to the measured energy.
 struct RmfError {
   double absolute = 0;  // mean absolute value
   double bias = 0;      // mean
 };
-
-[[nodiscard]] RmfError rmf_error(const RmfParameters& parameters,
-                                 std::span<const std::vector<RmfDrive>> missions);
 
 // Where a value stands in a configuration.
 struct RmfPlace {

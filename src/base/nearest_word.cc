@@ -6,8 +6,8 @@
 
 namespace joulecast {
 
-std::optional<std::string> nearest_word(std::string_view word, const std::vector<std::string>& candidates) {
-  std::optional<std::string> best;
+std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates) {
+  std::string best;
   std::size_t best_edits = std::max<std::size_t>(2, word.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
     // Levenshtein distance, one row at a time.
@@ -23,15 +23,10 @@ std::optional<std::string> nearest_word(std::string_view word, const std::vector
     }
     if (row.back() < best_edits) {
       best_edits = row.back();
-      best = candidate;
+      best = "; did you mean " + candidate + "?";
     }
   }
   return best;
-}
-
-std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates) {
-  const auto near = nearest_word(word, candidates);
-  return near ? "; did you mean " + *near + "?" : "";
 }
 
 }  // namespace joulecast

@@ -1,17 +1,13 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace joulecast {
 
-// The candidate nearest to a misspelt word by edits, or nullopt when none is near enough to be meant.
-std::optional<std::string> nearest_word(std::string_view word, const std::vector<std::string>& candidates);
-
-// "; did you mean X?", or empty.
+// "; did you mean X?" with the candidate nearest to a misspelt word by edits; empty when none is near enough.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
 
 // The same among named items.

@@ -43,8 +43,7 @@ double time_to_s(const Recording& recording, double end_voltage_v) {
   return at_s - recording.duration_s(row) * (1 - above_v / fall_v);
 }
 
-}  // namespace
-
+// The recording as a load. Power runs straight between rows of the same current and is held elsewhere.
 Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
   if (kind == Load::Kind::current) return held_load(kind, recording.time_s, recording.current_a);
   std::vector<double> power(recording.size());
@@ -55,6 +54,8 @@ Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
     if (same_current(recording, row)) load.pieces[row - 1].begin = power[row - 1];
   return load;
 }
+
+}  // namespace
 
 Result<Prediction> predict(const Circuit& circuit, const Recording& recording, Load::Kind from) {
   if (!(recording.charge_ah() > 0)) return invalid(recording.name, "draws no charge");

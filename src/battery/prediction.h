@@ -40,7 +40,4 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
 
 PredictionSummary summarise(const std::vector<Prediction>& predictions);
 
-// The recording as a load. Power runs straight between rows of the same current and is held elsewhere.
-Result<Load> recorded_load(const Recording& recording, Load::Kind kind);
-
 }  // namespace joulecast::battery

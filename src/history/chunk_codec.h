@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -16,39 +15,11 @@ namespace joulecast::history {
 
 using Bytes = std::vector<std::byte>;
 
-inline constexpr std::size_t max_varint_bytes = 10;
-
-void put_varint(Bytes& out, std::uint64_t value);
-
-// Integers as zigzag varints of the difference of differences, both starting from 0: wrapping, so that any
-// two have a difference.
-void put_integers(Bytes& out, std::span<const std::int64_t> values);
-
-// Doubles' bits: a byte 0 and 8 bytes when all are the same, else a byte 1 and eight planes of as many bytes,
-// least significant first, of every value's bits XORed with those of the value before it.
-void put_doubles(Bytes& out, std::span<const std::uint64_t> bits);
-
 // Appends one zstd frame. `level`: zstd's, 1 is fast.
 void append_compressed(Bytes& out, const Bytes& plain, int level);
 
 // The content of one zstd frame; Fault::corrupt on `what` for anything else, and for more than `max_bytes`.
 Result<Bytes> decompressed(std::span<const std::byte> frame, std::size_t max_bytes, const char* what);
-
-// Reads plain bytes; once they run out, every further read fails.
-class ByteReader {
- public:
-  explicit ByteReader(std::span<const std::byte> bytes) : rest_(bytes) {}
-
-  std::optional<std::uint64_t> varint();
-  std::optional<std::span<const std::byte>> take(std::size_t size);
-  // As many as the span holds, as put_integers() and put_doubles() wrote them.
-  bool integers(std::span<std::int64_t> values);
-  bool doubles(std::span<std::uint64_t> bits);
-  bool at_end() const { return rest_.empty(); }
-
- private:
-  std::span<const std::byte> rest_;
-};
 
 // Raw samples as a compressed block, bit-exact (NaN payloads included).
 //
@@ -72,9 +43,7 @@ Result<std::vector<signals::Sample>> decode_chunk(std::span<const std::byte> byt
 // Layout: one byte of format (1), then one zstd frame with checksum of
 //   number of names, varint; each name as its length, varint, and its bytes;
 //   number of changes, varint;
-//   times as put_integers(), each change's name as a varint into the names, values as put_doubles()
-//
-
+//   times as those of samples, each change's name as a varint into the names, values as a column of samples
 inline constexpr std::size_t max_chunk_changes = 65'536;
 
 // 1 to max_chunk_changes changes of names no longer than covariates may have. `level`: zstd's, 1 is fast.

@@ -27,6 +27,12 @@ double shortened(double value) {
   return std::round(value * scale) / scale;
 }
 
+// The present estimate of the charge, above the robot file's reserve. NaN: unknown.
+forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& battery) {
+  const double deviation = live.charge.estimate.sd;
+  return {live.state_of_charge, std::isfinite(deviation) ? deviation : 0, battery.reserve_fraction};
+}
+
 }  // namespace
 
 struct Forecasts::Entry {
@@ -184,11 +190,6 @@ void Forecasts::borrow(Entry& entry) {
   }
   entry.forecast->set_siblings(std::move(siblings));
   entry.outlook.forecaster = entry.forecast->forecaster();
-}
-
-forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& battery) {
-  const double deviation = live.charge.estimate.sd;
-  return {live.state_of_charge, std::isfinite(deviation) ? deviation : 0, battery.reserve_fraction};
 }
 
 forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& model,

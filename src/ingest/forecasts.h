@@ -83,9 +83,6 @@ class Forecasts {
   std::map<std::string, Kind, std::less<>> kinds_;
 };
 
-// The present estimate of the charge, above the robot file's reserve. NaN: unknown.
-forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& battery);
-
 // Stored form of past missions, and back; nothing when the text is not of that form.
 std::string legs_json(const std::deque<forecast::PastMission>& missions);
 std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::string& text);

@@ -86,8 +86,8 @@ bool without_groups(std::string& number, bool decimal_comma, bool grouped) {
   return true;
 }
 
-}  // namespace
-
+// Empty for anything but one number, perhaps with signs between groups of three digits; "nan" and "inf" are
+// numbers. `grouped`: one sign before three digits is between groups, too.
 std::optional<double> parse_number(std::string_view text, bool decimal_comma, bool grouped) {
   std::string plain;
   if (decimal_comma || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos) {
@@ -100,6 +100,8 @@ std::optional<double> parse_number(std::string_view text, bool decimal_comma, bo
   if (fault != std::errc{} || end != text.data() + text.size()) return std::nullopt;
   return value;
 }
+
+}  // namespace
 
 double Unwrapped::operator()(double value, double period) {
   if (std::isnan(value)) return value;

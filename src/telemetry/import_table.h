@@ -17,10 +17,6 @@ namespace joulecast::telemetry {
 
 inline constexpr std::int64_t latest_import_utime_us = 4'102'444'800'000'000;  // the year 2100
 
-// Empty for anything but one number, perhaps with signs between groups of three digits; "nan" and "inf" are
-// numbers. `grouped`: one sign before three digits is between groups, too.
-[[nodiscard]] std::optional<double> parse_number(std::string_view text, bool decimal_comma, bool grouped);
-
 struct CellPlace {
   std::size_t column = 0;
   std::optional<std::size_t> element = {};  // of a list in the cell
