@@ -126,9 +126,7 @@ Result<ClusterState> Leases::state() {
       Hearing& each = state.hearings.emplace_back();
       read_values(rows, each.node, each.robot_id, each.since_s);
     }
-    for (Rows rows(database, leases); rows.next();) {
-      state.leases.push_back(read_lease(rows));
-    }
+    for (Rows rows(database, leases); rows.next();) state.leases.push_back(read_lease(rows));
     return state;
   });
 }
@@ -210,9 +208,7 @@ Result<std::vector<std::int64_t>> Leases::take_jobs() {
               "cluster_job WHERE NOT EXISTS (SELECT 1 FROM cluster_node WHERE cluster_node.writer = "
               "cluster_job.writer) FOR UPDATE SKIP LOCKED) RETURNING diagnosis_id",
               options_.writer);
-    while (rows.next()) {
-      taken.push_back(rows.integer());
-    }
+    while (rows.next()) taken.push_back(rows.integer());
     return taken;
   });
 }
@@ -249,13 +245,11 @@ Result<std::vector<LiveState>> SharedState::news(const std::string& own_node) {
     {
       Rows rows(database, "SELECT robot_id, epoch, number FROM cluster_live WHERE node <> ?", own_node);
       while (rows.next()) {
-        std::string robot_id = rows.text();
+        std::string robot_id;
         Mark mark;
-        mark.epoch = rows.integer();
-        mark.number = rows.integer();
+        read_values(rows, robot_id, mark.epoch, mark.number);
         const auto seen = seen_.find(robot_id);
-        if (seen == seen_.end() || seen->second.epoch != mark.epoch || seen->second.number != mark.number)
-          changed.push_back(robot_id);
+        if (seen == seen_.end() || seen->second != mark) changed.push_back(robot_id);
         marks.emplace(std::move(robot_id), mark);
       }
     }
@@ -268,9 +262,7 @@ Result<std::vector<LiveState>> SharedState::news(const std::string& own_node) {
                 own_node, names);
       while (rows.next()) {
         LiveState& state = news.emplace_back();
-        state.robot_id = rows.text();
-        state.node = rows.text();
-        state.epoch = rows.integer();
+        read_values(rows, state.robot_id, state.node, state.epoch);
         const auto body = rows.blob();
         state.body.assign(body.begin(), body.end());
       }

@@ -136,6 +136,7 @@ class SharedState : OwnConnection {
   struct Mark {
     Epoch epoch = 0;
     std::int64_t number = 0;
+    bool operator==(const Mark&) const = default;
   };
   // Live states are published again in a moment: a commit need not wait for the disk.
   static constexpr const char* settings = "SET synchronous_commit = off; SET statement_timeout = '5s'";

@@ -71,15 +71,19 @@ class PostgresStatement final : public Statement {
   // One that is not kept has no name at the server, which would keep it as long as the connection.
   PostgresStatement(PostgresDatabase& database, std::string_view sql, bool kept)
       : database_(database), kept_(kept), sql_(numbered(sql, parameters_)) {
-    values_.resize(static_cast<std::size_t>(parameters_));
+    const auto count = static_cast<std::size_t>(parameters_);
+    data_.resize(count);
+    sizes_.resize(count);
+    formats_.resize(count);
+    digits_.resize(count);
   }
 
-  void bind_null(int parameter) override { at(parameter) = {}; }
+  void bind_null(int parameter) override { put(parameter, nullptr); }
   void bind(int parameter, std::int64_t value) override { bind_number(parameter, value); }
   void bind(int parameter, double value) override { bind_number(parameter, value); }
   void bind(int parameter, std::string_view value) override {
     // libpq takes a null pointer for NULL.
-    at(parameter) = {value.data() ? value.data() : "", static_cast<int>(value.size()), 1, {}};
+    put(parameter, value.data() ? value.data() : "", static_cast<int>(value.size()), 1);
   }
   void bind(int parameter, std::span<const std::byte> value) override {
     bind(parameter, std::string_view(reinterpret_cast<const char*>(value.data()), value.size()));
@@ -107,7 +111,7 @@ class PostgresStatement final : public Statement {
   void reset() override {
     result_.reset();
     row_ = -1;
-    for (Value& value : values_) value = {};
+    std::ranges::fill(data_, nullptr);
   }
 
   int columns() const override { return PQnfields(result_.get()); }
@@ -145,21 +149,19 @@ class PostgresStatement final : public Statement {
   }
 
  private:
-  struct Value {
-    const char* data = nullptr;
-    int size = 0;
-    int format = 0;  // 0: text, 1: binary
-    std::array<char, 32> digits{};
-  };
-
-  Value& at(int parameter) { return values_.at(static_cast<std::size_t>(parameter)); }
+  // `format`: 0: text, which ends with a zero byte, 1: binary.
+  void put(int parameter, const char* data, int size = 0, int format = 0) {
+    const auto k = static_cast<std::size_t>(parameter);
+    data_.at(k) = data;
+    sizes_[k] = size;
+    formats_[k] = format;
+  }
 
   template <class Number>
   void bind_number(int parameter, Number number) {
-    Value& value = at(parameter);
-    *std::to_chars(value.digits.data(), value.digits.data() + value.digits.size() - 1, number).ptr = '\0';
-    value.data = value.digits.data();
-    value.format = 0;
+    auto& digits = digits_.at(static_cast<std::size_t>(parameter));
+    *std::to_chars(digits.data(), digits.data() + digits.size() - 1, number).ptr = '\0';
+    put(parameter, digits.data());
   }
 
   void prepare() {
@@ -180,17 +182,10 @@ class PostgresStatement final : public Statement {
   }
 
   void send() {
-    std::vector<const char*> data;
-    std::vector<int> sizes, formats;
-    for (const Value& value : values_) {
-      data.push_back(value.data);
-      sizes.push_back(value.size);
-      formats.push_back(value.format);
-    }
-    const int sent = kept_ ? PQsendQueryPrepared(database_.handle(), name_.c_str(), parameters_, data.data(),
-                                                 sizes.data(), formats.data(), 1)
+    const int sent = kept_ ? PQsendQueryPrepared(database_.handle(), name_.c_str(), parameters_, data_.data(),
+                                                 sizes_.data(), formats_.data(), 1)
                            : PQsendQueryParams(database_.handle(), sql_.c_str(), parameters_, nullptr,
-                                               data.data(), sizes.data(), formats.data(), 1);
+                                               data_.data(), sizes_.data(), formats_.data(), 1);
     if (sent == 0) database_.raise(nullptr);
   }
 
@@ -198,7 +193,10 @@ class PostgresStatement final : public Statement {
   const bool kept_;
   int parameters_ = 0;
   std::string sql_, name_;
-  std::vector<Value> values_;
+  // Of the parameters, as libpq takes them.
+  std::vector<const char*> data_;
+  std::vector<int> sizes_, formats_;
+  std::vector<std::array<char, 32>> digits_;  // of numbers
   PostgresResult result_;
   int row_ = -1;
 };

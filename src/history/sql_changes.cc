@@ -12,7 +12,6 @@
 #include "history/schema.h"
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
-#include "history/sql_rows.h"
 
 namespace joulecast::history {
 namespace {
@@ -153,8 +152,7 @@ void SqlChanges::find_tails(MissionKey key, Place& place) {
   const auto left = tails_.find(key);
   if (left != tails_.end() && !place.was_ended && left->second.samples == place.samples &&
       left->second.changes == place.changes) {
-    place.samples_in_tail = left->second.samples_in_tail;
-    place.changes_in_tail = left->second.changes_in_tail;
+    static_cast<Tails&>(place) = left->second;
     return;
   }
   static const std::string sql = "SELECT " + chunks::in_tails_sql() + " FROM mission WHERE mission_key = ?";

@@ -48,17 +48,15 @@ class SqlChanges {
   // Rows collected from checkpoints, to be stored by one statement for each table; null: each row is stored
   // immediately.
   struct Bulk;
-  // Where a mission goes on: how many samples and changes of covariates it has.
-  struct Place {
-    std::string robot_id;
-    std::int64_t start_utime_us = 0, samples = 0, changes = 0, samples_in_tail = 0, changes_in_tail = 0;
-    bool was_ended = false;
-  };
-
-  // How much of a mission is in its tails, which the rows there would have to be read for, when its counts
-  // were these.
+  // How many samples and changes of covariates a mission has, and how many of them are in its tails.
   struct Tails {
     std::int64_t samples = 0, changes = 0, samples_in_tail = 0, changes_in_tail = 0;
+  };
+  // Where a mission goes on.
+  struct Place : Tails {
+    std::string robot_id;
+    std::int64_t start_utime_us = 0;
+    bool was_ended = false;
   };
 
   void begin(std::span<const Command> commands);
@@ -130,7 +128,8 @@ class SqlChanges {
   bool committed_ = false;              // the last transaction
   bool in_spool_ = false;               // the commands are a spool's
   std::int64_t stored_already_ = 0;     // of a spool's next commands
-  std::map<MissionKey, Tails> tails_;   // of open missions, as they were left
+  // Of open missions, as they were left: the rows there need not be read where the counts are still these.
+  std::map<MissionKey, Tails> tails_;
   std::set<std::string> known_robots_;  // that are stored
 };
 

@@ -21,7 +21,8 @@
 namespace joulecast::history {
 namespace {
 
-// All but those that identify a store and its spools: a copy is a store of its own.
+// All but those that identify a store and its spools: a copy is a store of its own. No row comes before one
+// that it refers to, but for a robot's active version.
 std::vector<const Table*> copied_tables() {
   std::vector<const Table*> copied;
   for (const Table& table : store_tables())
@@ -159,23 +160,13 @@ TableSummary summarize(Database& database, const Table& table, const TableProgre
 }
 
 void bind_column(Rows& to, const Statement& from, int column) {
-  switch (from.type(column)) {
-    case Statement::Type::null:
-      to.bind_null();
-      return;
-    case Statement::Type::integer:
-      to.bind(from.integer(column));
-      return;
-    case Statement::Type::real:
-      to.bind(from.real(column));
-      return;
-    case Statement::Type::text:
-      to.bind(from.bytes(column));
-      return;
-    case Statement::Type::blob:
-      to.bind(std::as_bytes(std::span(from.bytes(column))));
-      return;
-  }
+  using enum Statement::Type;
+  const Statement::Type type = from.type(column);
+  if (type == null) to.bind_null();
+  if (type == integer) to.bind(from.integer(column));
+  if (type == real) to.bind(from.real(column));
+  if (type == text) to.bind(from.bytes(column));
+  if (type == blob) to.bind(std::as_bytes(std::span(from.bytes(column))));
 }
 
 // Robots before their models: which one is active comes when both are there. Answers the rows found.
@@ -198,13 +189,8 @@ Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table
         scan(from, table, columns, after, batch_rows(copied.get()), [&](const Statement& row) {
           copied.add(row, later);
           Rows target(to, insert);
-          for (int k = 0; k < row.columns(); ++k) {
-            if (k == later) {
-              target.bind_null();
-            } else {
-              bind_column(target, row, k);
-            }
-          }
+          for (int k = 0; k < row.columns(); ++k)
+            k == later ? void(target.bind_null()) : bind_column(target, row, k);
           target.run_later();
         });
     transaction.commit();
@@ -330,12 +316,6 @@ class ContentCheck {
 };
 
 }  // namespace
-
-std::vector<std::string> table_names() {
-  std::vector<std::string> names;
-  for (const Table* table : copied_tables()) names.push_back(table->name);
-  return names;
-}
 
 Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress) {
   return guarded([&]() -> Result<std::vector<TableSummary>> {

@@ -64,8 +64,4 @@ struct VerifyReport : ContentReport {
 // Reads every row of every table and checks their content.
 Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress);
 
-// Of every store, in an order in which no row comes before one that it refers to, but for a robot's active
-// version.
-std::vector<std::string> table_names();
-
 }  // namespace joulecast::history

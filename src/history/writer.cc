@@ -373,7 +373,6 @@ bool Writer::settle(std::vector<Outcome>& outcomes, bool idle, double duration_s
     why_.clear();
     if (!idle && !outcomes.empty()) {
       ++status_.commits;
-      status_.max_commit_s = std::max(status_.max_commit_s, duration_s);
       status_.total_commit_s += duration_s;
     }
     item = batch_.items.begin();

@@ -65,7 +65,6 @@ struct WriterStatus {
   std::uint64_t commits = 0;       // transactions committed
   std::uint64_t failed_commits = 0;  // attempts that failed and were tried again
   std::uint64_t pruned_chunks = 0, pruned_missions = 0, pruned_events = 0, pruned_audit = 0;
-  double max_commit_s = 0;
   double total_commit_s = 0;  // over all `commits`
   double oldest_wait_s = 0;   // age of the oldest command not yet committed
   double attempt_s = 0;       // how long the commit that runs now has been running; 0: none runs

@@ -87,7 +87,9 @@ TEST_F(StoreCopyTest, ListsEveryTable) {
       database.statement("SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%' "
                          "AND name NOT IN ('joulecast_store', 'taken_spool')"));
   while (rows.next()) stored.push_back(rows.text());
-  EXPECT_THAT(table_names(), testing::UnorderedElementsAreArray(stored));
+  std::vector<std::string> copied;
+  for (const TableSummary& table : need(summarize_tables(database, quietly))) copied.push_back(table.table);
+  EXPECT_THAT(copied, testing::UnorderedElementsAreArray(stored));
 }
 
 TEST_F(StoreCopyTest, RoundTripThroughPostgresIsExact) {
