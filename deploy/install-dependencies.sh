@@ -6,7 +6,7 @@ packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
   liblcm-dev liblcm-bin libglib2.0-dev libeigen3-dev libsundials-dev libsqlite3-dev libpq-dev
   nlohmann-json3-dev libre2-dev
-  libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev libhowardhinnant-date-dev
+  libboost-dev libceres-dev libcli11-dev libfmt-dev prometheus-cpp-dev libexpected-dev libhowardhinnant-date-dev
   libssl-dev libmosquitto-dev libsystemd-dev libzstd-dev zlib1g-dev
   iproute2 curl python3 python3-markdown
 )

@@ -1,10 +1,9 @@
 #include "server/logging.h"
 
-#include <spdlog/sinks/stdout_sinks.h>
-#include <spdlog/spdlog.h>
+#include <fmt/format.h>
 
 #include <atomic>
-#include <memory>
+#include <cstdio>
 
 #include "base/host_clock.h"
 #include "base/utc_time.h"
@@ -13,28 +12,11 @@ namespace joulecast {
 namespace {
 
 std::atomic<LogFormat> chosen_format{LogFormat::text};
-
-spdlog::level::level_enum level_of(LogLevel level) {
-  constexpr spdlog::level::level_enum levels[] = {spdlog::level::debug, spdlog::level::info,
-                                                  spdlog::level::warn, spdlog::level::err};
-  return levels[static_cast<std::size_t>(level)];
-}
+std::atomic<LogLevel> least_level{LogLevel::info};
 
 std::string_view name_of(LogLevel level) {
   constexpr std::string_view names[] = {"debug", "info", "warning", "error"};
   return names[static_cast<std::size_t>(level)];
-}
-
-spdlog::logger& logger() {
-  static const std::shared_ptr<spdlog::logger> instance = [] {
-    auto made =
-        std::make_shared<spdlog::logger>("joulecast", std::make_shared<spdlog::sinks::stderr_sink_mt>());
-    made->set_pattern("%v");
-    made->set_level(spdlog::level::info);
-    made->flush_on(spdlog::level::info);
-    return made;
-  }();
-  return *instance;
 }
 
 std::string time_text(std::int64_t utime_us) {
@@ -86,21 +68,13 @@ std::string format_log_line(LogFormat format, LogLevel level, std::string_view m
 
 void configure_logging(LogFormat format, LogLevel level) {
   chosen_format = format;
-  logger().set_level(level_of(level));
-}
-
-bool log_enabled(LogLevel level) {
-  return logger().should_log(level_of(level));
+  least_level = level;
 }
 
 void log(LogLevel level, std::string_view message, const LogFields& fields) {
-  if (!log_enabled(level)) return;
-  const std::string line = format_log_line(chosen_format, level, message, fields, host_utime_us());
-  logger().log(level_of(level), spdlog::string_view_t(line.data(), line.size()));
-}
-
-void flush_log() {
-  logger().flush();
+  if (level < least_level) return;
+  const std::string line = format_log_line(chosen_format, level, message, fields, host_utime_us()) + '\n';
+  std::fwrite(line.data(), 1, line.size(), stderr);  // at once: stderr has a lock and no buffer
 }
 
 }  // namespace joulecast

@@ -22,9 +22,6 @@ void configure_logging(LogFormat format, LogLevel level);
 
 void log(LogLevel level, std::string_view message, const LogFields& fields = {});
 
-// True when a line of that level would be written: guards costly fields.
-bool log_enabled(LogLevel level);
-
 // The line of an event, without its newline; what log() writes.
 std::string format_log_line(LogFormat format, LogLevel level, std::string_view message,
                             const LogFields& fields, std::int64_t utime_us);
@@ -41,8 +38,5 @@ inline void log_error(std::string_view message, const LogFields& fields = {}) {
 inline void log_error(std::string_view message, const Error& error) {
   log(LogLevel::error, message, {{"cause", describe(error)}});
 }
-
-// Writes buffered lines; call before the process ends.
-void flush_log();
 
 }  // namespace joulecast

@@ -61,7 +61,6 @@ int serve(const joulecast::DaemonOptions& options) {
   joulecast::log_info("stopping");
   const bool ended = (*application)->stop();
   joulecast::log_info(ended ? "stopped" : "stopped; unfinished work was abandoned");
-  joulecast::flush_log();
   // All data are written; a computation that cannot be cancelled does not delay the end.
   if (!ended) std::_Exit(EXIT_SUCCESS);
   return 0;
