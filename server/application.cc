@@ -324,22 +324,21 @@ struct Application::Parts {
     forecasts = std::make_unique<ingest::Forecasts>(*store);
     forecasts->set_siblings_pending(true);
     drift_view = std::make_unique<server::DriftView>(*store, models, options.drift);
+    const server::Parts parts{*store,        *writer,
+                              models,        *drift_view,
+                              host_utime_us, [](const Error& error) { log_error("diagnosis", error); }};
     server::AdoptionOptions adopting = options.adoption;
     adopting.meter = options.ingest.session.meter;
-    adoption = std::make_unique<server::ModelAdoption>(*store, *writer, models, *drift_view, host_utime_us,
-                                                       adopting);
-    review =
-        std::make_unique<server::ProposalReview>(*store, *writer, *adoption, *drift_view, host_utime_us,
-                                                 server::ReviewOptions{options.adopts_automatically, warn});
+    adoption = std::make_unique<server::ModelAdoption>(parts, adopting);
+    review = std::make_unique<server::ProposalReview>(
+        parts, *adoption, server::ReviewOptions{options.adopts_automatically, warn});
     review->start();
-    const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
     diagnoses = std::make_unique<server::DiagnosisService>(
-        *store, *writer, models, *drift_view, host_utime_us, options.diagnosis, warn_of,
+        parts, options.diagnosis,
         [this](const history::DiagnosisRecord& diagnosis) { watch->on_diagnosis(diagnosis); });
     server::WatchOptions watching = options.watch;
     watching.is_own = is_own();
-    watch = std::make_unique<server::GapWatch>(*store, *writer, models, *drift_view, *forecasts, *diagnoses,
-                                               host_utime_us, watching, warn_of);
+    watch = std::make_unique<server::GapWatch>(parts, *forecasts, *diagnoses, watching);
     Result<void> started = diagnoses->start();
     if (started) watch->start();
     return started;
@@ -376,6 +375,10 @@ struct Application::Parts {
     server::export_attention_metrics(metrics, *attention);
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
     server::export_process_metrics(metrics);
+    metrics.series([this]() -> std::vector<Metrics::Series> {
+      return {{"joulecast_robot_files_faulty", "Faulty robot files that were skipped at the start",
+               faulty_files}};
+    });
     server::export_robot_metrics(metrics, fleet, *watch, host_utime_us, options.robots_with_metrics);
   }
 
@@ -491,7 +494,7 @@ struct Application::Parts {
     for (const Error& faulty : files.faulty) log_error("robot file left out", faulty);
     for (const auto& [path, robot] : files.robots)
       TRY(ingest::load_robot(robot, path, *store, *writer, host_utime_us()));
-    faulty_files.set(static_cast<double>(files.faulty.size()));
+    faulty_files = files.faulty.size();
     log_info("robot files read", {{"directory", directory},
                                   {"files", std::to_string(files.robots.size())},
                                   {"faulty", std::to_string(files.faulty.size())}});
@@ -561,12 +564,10 @@ struct Application::Parts {
   }
 
   void run_beat(const std::stop_token& stop) {
-    server::FleetEvents fleet_events(fleet, recent, models, *forecasts, *store, events,
-                                     [this](const history::Mission& mission, const std::string& json) {
-                                       if (webhooks)
-                                         webhooks->offer("mission", mission.robot_id, mission.end_utime_us,
-                                                         json);
-                                     });
+    server::FleetEvents fleet_events(
+        *services, recent, events, [this](const history::Mission& mission, const std::string& json) {
+          if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, json);
+        });
     do {
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
       survive("tokens", [&] { read_tokens(); });
@@ -575,8 +576,7 @@ struct Application::Parts {
 
   const DaemonOptions options;
   Metrics metrics;
-  const Gauge faulty_files =
-      metrics.gauge("joulecast_robot_files_faulty", "Faulty robot files that were skipped at the start");
+  std::size_t faulty_files = 0;
   http::EventHub events;
   ingest::ModelRegistry models;
   ingest::FleetView fleet;

@@ -27,15 +27,15 @@ void FleetEvents::publish_contradictions(const ingest::RobotSnapshot& now, Publi
 }
 
 void FleetEvents::publish(std::int64_t now_utime_us) {
-  std::erase_if(published_, [&](const auto& each) { return fleet_.find(each.first) == nullptr; });
-  recent_.keep([&](const std::string& id) { return fleet_.find(id) != nullptr; });
-  for (const auto& snapshot : fleet_.all()) {
+  std::erase_if(published_, [&](const auto& each) { return services_.fleet.find(each.first) == nullptr; });
+  recent_.keep([&](const std::string& id) { return services_.fleet.find(id) != nullptr; });
+  for (const auto& snapshot : services_.fleet.all()) {
     recent_.take(*snapshot);
     Published& published = published_[snapshot->robot_id];
     const bool live = api::is_live(*snapshot, now_utime_us);
     if (published.snapshot != nullptr && published.snapshot->mission_key > 0 &&
         published.snapshot->mission_key != snapshot->mission_key) {
-      if (const auto mission = store_.mission(published.snapshot->mission_key)) {
+      if (const auto mission = services_.store.mission(published.snapshot->mission_key)) {
         JsonWriter json;
         answers::mission_table().write(json, *mission);
         const std::string text = rounded(json);
@@ -45,10 +45,10 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     }
     if (published.snapshot == snapshot && published.live == live) continue;
     publish_contradictions(*snapshot, published);
-    const auto model = models_.find(snapshot->robot_id);
+    const auto model = services_.models.find(snapshot->robot_id);
     JsonWriter json;
     std::optional<forecast::Reach> reach;
-    if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
+    if (model != nullptr) reach = services_.forecasts.reach(model, *snapshot);
     api::state_table().write(json, {*snapshot, reach, now_utime_us});
     hub_.publish_newest("state", rounded(json), snapshot->robot_id);
     published.snapshot = snapshot;

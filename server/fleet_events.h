@@ -6,11 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "history/store.h"
-#include "ingest/fleet_view.h"
-#include "ingest/forecasts.h"
-#include "ingest/model_registry.h"
-#include "ingest/recent_values.h"
+#include "server/api/services.h"
 #include "server/http/event_hub.h"
 
 namespace joulecast::server {
@@ -23,16 +19,9 @@ class FleetEvents {
   // Also called with each mission that ended and its JSON.
   using MissionSink = std::function<void(const history::Mission&, const std::string& json)>;
 
-  FleetEvents(const ingest::FleetView& fleet, ingest::RecentValues& recent,
-              const ingest::ModelRegistry& models, ingest::Forecasts& forecasts, const history::Store& store,
-              http::EventHub& hub, MissionSink mission_ended)
-      : fleet_(fleet),
-        recent_(recent),
-        models_(models),
-        forecasts_(forecasts),
-        store_(store),
-        hub_(hub),
-        mission_ended_(std::move(mission_ended)) {}
+  FleetEvents(const api::Services& services, ingest::RecentValues& recent, http::EventHub& hub,
+              MissionSink mission_ended)
+      : services_(services), recent_(recent), hub_(hub), mission_ended_(std::move(mission_ended)) {}
 
   void publish(std::int64_t now_utime_us);
 
@@ -44,11 +33,8 @@ class FleetEvents {
   };
   void publish_contradictions(const ingest::RobotSnapshot& now, Published& published);
 
-  const ingest::FleetView& fleet_;
+  const api::Services& services_;
   ingest::RecentValues& recent_;
-  const ingest::ModelRegistry& models_;
-  ingest::Forecasts& forecasts_;
-  const history::Store& store_;
   http::EventHub& hub_;
   const MissionSink mission_ended_;
   std::map<std::string, Published> published_;

@@ -114,7 +114,7 @@ struct DiagnosisService::Job {
 };
 
 Result<void> DiagnosisService::start() {
-  TRY(writer_.execute(history::InterruptDiagnoses{now_utime_us_()}));
+  TRY(parts_.writer.execute(history::InterruptDiagnoses{parts_.now_utime_us()}));
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
   return {};
 }
@@ -129,10 +129,10 @@ void DiagnosisService::stop() {
 }
 
 Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, const Closing& closing) {
-  const auto model = models_.find(request.robot_id);
+  const auto model = parts_.models.find(request.robot_id);
   if (model == nullptr) return tl::unexpected(ingest::unknown_robot("/robot_id", request.robot_id));
   for (std::size_t k = 0; k < request.missions.size(); ++k) {
-    const auto mission = store_.mission(request.missions[k]);
+    const auto mission = parts_.store.mission(request.missions[k]);
     const std::string field = "/missions/" + std::to_string(k);
     if (!mission) return fail(mission.error().fault, field, mission.error().message);
     if (mission->robot_id != request.robot_id)
@@ -146,7 +146,7 @@ Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, c
   job->request = request;
   DiagnosisRecord& record = job->record;
   record.robot_id = request.robot_id;
-  record.created_utime_us = now_utime_us_();
+  record.created_utime_us = parts_.now_utime_us();
   record.cause = request.cause;
   record.request_json = request_json(request).dump();
   const std::lock_guard submitting(submitting_);
@@ -161,7 +161,7 @@ Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, c
   }
   history::Change change = closing ? closing(record, ahead) : history::Change{};
   change.command = history::AddDiagnosis{record};
-  TRY_ASSIGN(const std::int64_t id, writer_.execute(std::move(change)));
+  TRY_ASSIGN(const std::int64_t id, parts_.writer.execute(std::move(change)));
   record.id = id;
   {
     const std::lock_guard lock(mutex_);
@@ -172,7 +172,7 @@ Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, c
 }
 
 Result<void> DiagnosisService::take_over(std::int64_t id) {
-  TRY_ASSIGN(auto stored, store_.diagnosis(id));
+  TRY_ASSIGN(auto stored, parts_.store.diagnosis(id));
   auto job = std::make_shared<Job>();
   job->request = request_of(stored);
   job->record = std::move(stored);
@@ -189,7 +189,7 @@ Result<void> DiagnosisService::take_over(std::int64_t id) {
 }
 
 Result<void> DiagnosisService::cancel(std::int64_t id, const Closing& closing) {
-  TRY_ASSIGN(const auto stored, store_.diagnosis(id));
+  TRY_ASSIGN(const auto stored, parts_.store.diagnosis(id));
   std::shared_ptr<Job> waiting, running;
   {
     const std::lock_guard lock(mutex_);
@@ -205,7 +205,7 @@ Result<void> DiagnosisService::cancel(std::int64_t id, const Closing& closing) {
     end_record(waiting->record, DiagnosisState::cancelled, "cancelled before it began");
     history::Change change = closing ? closing(waiting->record, 0) : history::Change{};
     change.command = history::UpdateDiagnosis{waiting->record, {}};
-    if (const auto done = writer_.execute(std::move(change)); !done) {
+    if (const auto done = parts_.writer.execute(std::move(change)); !done) {
       const std::lock_guard lock(mutex_);
       end_record(waiting->record, DiagnosisState::queued, {});
       waiting_.push_front(std::move(waiting));
@@ -217,7 +217,7 @@ Result<void> DiagnosisService::cancel(std::int64_t id, const Closing& closing) {
   }
   if (running) {
     // The job ends soon after; until then its progress is what there is to see.
-    if (closing) TRY(writer_.execute(closing(stored, 0)));
+    if (closing) TRY(parts_.writer.execute(closing(stored, 0)));
     running->cancelled = true;
     return {};
   }
@@ -257,7 +257,7 @@ Result<void> DiagnosisService::any_ended(const DiagnosisRequest& request) const 
   ended.robot_ids = {request.robot_id};
   ended.start_from_utime_us = request.since_utime_us;
   ended.states = {State::finished, State::aborted, State::unfinished, State::superseded, State::interrupted};
-  TRY_ASSIGN(const auto page, store_.missions(ended, {.limit = 1, .cursor = {}}));
+  TRY_ASSIGN(const auto page, parts_.store.missions(ended, {.limit = 1, .cursor = {}}));
   if (!page.missions.empty()) return {};
   return fail(Fault::conflict, request.since_utime_us ? "/since_utime_us" : "/robot_id",
               "robot " + request.robot_id + " has no mission" +
@@ -273,7 +273,7 @@ void DiagnosisService::work(const std::stop_token& stop) {
       wake_.wait(lock, stop, [this] { return !waiting_.empty(); });
       if (stop.stop_requested()) return;  // the next start marks waiting jobs as interrupted
       job = waiting_.front();
-      job->started_utime_us = now_utime_us_();
+      job->started_utime_us = parts_.now_utime_us();
       running_ = job;
       waiting_.pop_front();
     }
@@ -293,8 +293,8 @@ void DiagnosisService::run(Job& job) {
   DiagnosisRecord& record = job.record;
   record.state = DiagnosisState::running;
   record.started_utime_us = job.started_utime_us;
-  if (const auto stored = writer_.execute(history::UpdateDiagnosis{record, {}}); !stored)
-    on_error_(stored.error());
+  if (const auto stored = parts_.writer.execute(history::UpdateDiagnosis{record, {}}); !stored)
+    parts_.on_error(stored.error());
   const Result<void> judged = judge(job);
   if (judged) return finish(job, DiagnosisState::done, {}, std::move(report_));
   if (job.cancelled && stopping())
@@ -306,7 +306,7 @@ void DiagnosisService::run(Job& job) {
 Result<void> DiagnosisService::judge(Job& job) {
   DiagnosisRecord& record = job.record;
   const DiagnosisRequest& request = job.request;
-  const auto model = models_.find(record.robot_id);
+  const auto model = parts_.models.find(record.robot_id);
   if (model == nullptr) return fail(Fault::not_found, "robot_id", "the robot has no model any more");
   record.model_version = model->version;
   RecordingsWanted wanted;
@@ -315,12 +315,12 @@ Result<void> DiagnosisService::judge(Job& job) {
   wanted.since_utime_us = request.since_utime_us;
   // A robot that changed counts as two robots: only the missions since the change are diagnosed.
   if (request.missions.empty() && !request.since_utime_us) {
-    TRY_ASSIGN(wanted.since_utime_us, drift_.last_change(record.robot_id, model->version));
+    TRY_ASSIGN(wanted.since_utime_us, parts_.drift.last_change(record.robot_id, model->version));
   }
   wanted.max_missions = std::min(request.max_missions, options_.max_missions);
   wanted.max_samples = options_.max_samples;
   wanted.battery_capacity_ah = model->robot.battery.capacity_ah;
-  TRY_ASSIGN(StoredRecordings history, read_recordings(store_, wanted));
+  TRY_ASSIGN(StoredRecordings history, read_recordings(parts_.store, wanted));
   if (history.missions.empty())
     return invalid("/missions", "none of the robot's missions can be diagnosed (their telemetry: " +
                                     std::to_string(history.left_out.no_telemetry) + " without, " +
@@ -340,7 +340,7 @@ Result<void> DiagnosisService::judge(Job& job) {
   }
   history.missions.clear();
   TRY_ASSIGN(auto set, telemetry::make_recording_set(record.robot_id, std::move(recordings)));
-  const std::string made_at = format_utc(now_utime_us_());
+  const std::string made_at = format_utc(parts_.now_utime_us());
   const auto answer = run_confined(
       {options_.max_memory_bytes, options_.deadline},
       [&](const Report& report) -> Result<std::string> {
@@ -362,14 +362,15 @@ Result<void> DiagnosisService::judge(Job& job) {
   record.model_json = found["model"].get<std::string>();
   report_ = found["report"].get<std::string>();
   if (const auto& error = found["error"]; error != "")
-    on_error_({Fault::internal, "model", error.get<std::string>()});
+    parts_.on_error({Fault::internal, "model", error.get<std::string>()});
   return {};
 }
 
 void DiagnosisService::end_record(DiagnosisRecord& record, DiagnosisState state, std::string error) const {
   record.state = state;
   record.error = std::move(error);
-  record.finished_utime_us = state == DiagnosisState::queued ? std::nullopt : std::optional(now_utime_us_());
+  record.finished_utime_us =
+      state == DiagnosisState::queued ? std::nullopt : std::optional(parts_.now_utime_us());
 }
 
 void DiagnosisService::finish(Job& job, DiagnosisState state, std::string error, std::string report) {
@@ -378,11 +379,11 @@ void DiagnosisService::finish(Job& job, DiagnosisState state, std::string error,
   // The result is in the store before the job leaves the queue, so that it is always found in one of
   // them.
   history::UpdateDiagnosis update{record, std::move(report)};
-  if (const auto stored = writer_.execute(update); !stored) {
-    on_error_(stored.error());
+  if (const auto stored = parts_.writer.execute(update); !stored) {
+    parts_.on_error(stored.error());
     // Minutes of work wait until the store takes data again.
     if (stored.error().fault == Fault::unavailable) {
-      if (const auto waits = writer_.offer(std::move(update)); !waits) on_error_(waits.error());
+      if (const auto waits = parts_.writer.offer(std::move(update)); !waits) parts_.on_error(waits.error());
     }
   }
   settle(job);

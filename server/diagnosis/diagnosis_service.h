@@ -63,18 +63,8 @@ class DiagnosisService {
   using Ended = std::function<void(const history::DiagnosisRecord&)>;
 
   // `on_ended` is called with every job that has ended and is stored; called on the service's thread.
-  DiagnosisService(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-                   const DriftView& drift, std::function<std::int64_t()> now_utime_us,
-                   const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
-                   Ended on_ended = {})
-      : store_(store),
-        writer_(writer),
-        models_(models),
-        drift_(drift),
-        now_utime_us_(std::move(now_utime_us)),
-        options_(options),
-        on_error_(std::move(on_error)),
-        on_ended_(std::move(on_ended)) {}
+  DiagnosisService(Parts parts, const DiagnosisOptions& options, Ended on_ended = {})
+      : parts_(std::move(parts)), options_(options), on_ended_(std::move(on_ended)) {}
   ~DiagnosisService() { stop(); }  // cancels the running job
 
   // Marks jobs that the last daemon left unfinished, then starts to work.
@@ -111,13 +101,8 @@ class DiagnosisService {
   void finish(Job& job, history::DiagnosisState state, std::string error, std::string report);
   void settle(Job& job);
 
-  const history::Store& store_;
-  history::Writer& writer_;
-  const ingest::ModelRegistry& models_;
-  const DriftView& drift_;
-  std::function<std::int64_t()> now_utime_us_;
+  const Parts parts_;
   DiagnosisOptions options_;
-  std::function<void(const Error&)> on_error_;
   Ended on_ended_;
   std::string report_;     // of the job that runs, as HTML
   std::mutex submitting_;  // between looking at the queue and entering it

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "drift/marks.h"
 #include "drift/siblings.h"
 #include "history/store.h"
+#include "history/writer.h"
 #include "ingest/model_registry.h"
 
 namespace joulecast::server {
@@ -54,6 +56,16 @@ class DriftView {
   const history::Store& store_;
   const ingest::ModelRegistry& models_;
   DriftOptions options_;
+};
+
+// The parts of the daemon that diagnoses and adoptions use; all are safe to use from any thread.
+struct Parts {
+  const history::Store& store;
+  history::Writer& writer;
+  ingest::ModelRegistry& models;
+  const DriftView& drift;
+  std::function<std::int64_t()> now_utime_us;
+  std::function<void(const Error&)> on_error = {};
 };
 
 }  // namespace joulecast::server

@@ -76,10 +76,10 @@ void GapWatch::run(const std::stop_token& stop) {
         next += period;
         return look();
       }
-      if (const Result<void> stored = writer_.flush(); !stored) return on_error_(stored.error());
+      if (const Result<void> stored = parts_.writer.flush(); !stored) return parts_.on_error(stored.error());
       std::vector<std::shared_ptr<const ingest::ModelInForce>> models;
       for (const std::string& robot_id : ended)
-        if (auto model = models_.find(robot_id)) models.push_back(std::move(model));
+        if (auto model = parts_.models.find(robot_id)) models.push_back(std::move(model));
       look_at(models);
     });
   }
@@ -94,15 +94,15 @@ void GapWatch::mission_ended(const std::string& robot_id) {
 }
 
 void GapWatch::record(const std::string& robot_id, const std::string& kind, std::string detail_json) {
-  const auto posted =
-      writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
-  if (!posted) on_error_(posted.error());
+  const auto posted = parts_.writer.offer(
+      history::AppendEvent{{0, parts_.now_utime_us(), robot_id, kind, std::move(detail_json)}});
+  if (!posted) parts_.on_error(posted.error());
 }
 
 Result<void> GapWatch::remember(const std::string& robot_id, std::int64_t announced_utime_us,
                                 bool stood_out) {
   const Json body = {{"announced_utime_us", announced_utime_us}, {"stood_out", stood_out}};
-  return writer_.execute(history::PutLearned{{robot_id, topic, now_utime_us_(), body.dump()}})
+  return parts_.writer.execute(history::PutLearned{{robot_id, topic, parts_.now_utime_us(), body.dump()}})
       .map([](const auto&) {});
 }
 
@@ -115,10 +115,10 @@ bool GapWatch::is_own(const std::string& robot_id) const {
 }
 
 void GapWatch::look() {
-  const auto models = models_.all();
+  const auto models = parts_.models.all();
   {
     const std::lock_guard lock(mutex_);
-    std::erase_if(findings_, [&](const auto& each) { return models_.find(each.first) == nullptr; });
+    std::erase_if(findings_, [&](const auto& each) { return parts_.models.find(each.first) == nullptr; });
     ++rounds_;
   }
   look_at(models);
@@ -126,10 +126,10 @@ void GapWatch::look() {
 
 Result<WatchFinding> GapWatch::find(const ingest::ModelInForce& model) const {
   const std::string& robot_id = model.robot.robot_id;
-  TRY_ASSIGN(auto newest, drift_.recent(model));
+  TRY_ASSIGN(auto newest, parts_.drift.recent(model));
   WatchFinding found{robot::kind_of(model.robot), {robot_id, std::move(newest)}, {}, {}};
   if (!watches(robot_id)) return found;
-  TRY_ASSIGN(const auto marks, drift_.marks(robot_id));
+  TRY_ASSIGN(const auto marks, parts_.drift.marks(robot_id));
   if (!marks.empty()) found.change = marks.back();
   return found;
 }
@@ -137,7 +137,7 @@ Result<WatchFinding> GapWatch::find(const ingest::ModelInForce& model) const {
 void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInForce>>& models) {
   const std::lock_guard looking(looking_);
   const auto report_fault = [this](const Result<void>& done) {
-    if (!done) on_error_(done.error());
+    if (!done) parts_.on_error(done.error());
   };
   auto findings = this->findings();
   std::set<std::string> kinds;
@@ -145,7 +145,7 @@ void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInFo
     const std::string& robot_id = model->robot.robot_id;
     Result<WatchFinding> found = find(*model);
     if (!found) {
-      on_error_(found.error());
+      parts_.on_error(found.error());
       continue;
     }
     kinds.insert(found->kind);
@@ -161,7 +161,7 @@ void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInFo
       found.among_kind.reset();
       robots.push_back(found.newest);
     }
-    const std::vector<drift::SiblingRatio> compared = drift_.compare(robots);
+    const std::vector<drift::SiblingRatio> compared = parts_.drift.compare(robots);
     for (const drift::SiblingRatio& s : compared) {
       if (!watches(s.robot_id)) continue;
       if (is_own(s.robot_id)) report_fault(announce_sibling(s, compared.size() - 1));
@@ -173,7 +173,7 @@ void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInFo
 }
 
 Result<void> GapWatch::announce_sibling(const drift::SiblingRatio& s, std::size_t compared_with) {
-  TRY_ASSIGN(const Memory memory, read_memory(store_, s.robot_id));
+  TRY_ASSIGN(const Memory memory, read_memory(parts_.store, s.robot_id));
   if (memory.stood_out == s.stands_out) return {};
   record(s.robot_id, "gap_sibling",
          Json{{"stands_out", s.stands_out},
@@ -186,7 +186,7 @@ Result<void> GapWatch::announce_sibling(const drift::SiblingRatio& s, std::size_
 }
 
 Result<void> GapWatch::announce_drift(const std::string& robot_id, const drift::Mark& mark) {
-  TRY_ASSIGN(const Memory memory, read_memory(store_, robot_id));
+  TRY_ASSIGN(const Memory memory, read_memory(parts_.store, robot_id));
   if (mark.utime_us <= memory.announced_utime_us) return {};
   {
     const std::lock_guard lock(mutex_);
@@ -201,7 +201,7 @@ Result<void> GapWatch::announce_drift(const std::string& robot_id, const drift::
     if (const auto id = diagnoses_.submit(request)) {
       detail["diagnosis_id"] = *id;
     } else {
-      on_error_(id.error());
+      parts_.on_error(id.error());
     }
   }
   record(robot_id, "gap_drift", detail.dump());
@@ -249,7 +249,7 @@ WatchCounts GapWatch::counts() const {
   std::vector<double> now;
   for (const auto& [robot_id, found] : findings_) {
     if (!watches(robot_id)) continue;
-    const auto model = models_.find(robot_id);
+    const auto model = parts_.models.find(robot_id);
     counts.drifting += found.change && model != nullptr && found.change->model_version == model->version;
     if (found.among_kind) {
       counts.standing_out += found.among_kind->stands_out;

@@ -53,19 +53,9 @@ struct WatchFinding {
 // is an event "gap_sibling".
 class GapWatch {
  public:
-  GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-           const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
-           std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
-           std::function<void(const Error&)> on_error)
-      : store_(store),
-        writer_(writer),
-        models_(models),
-        drift_(drift),
-        forecasts_(forecasts),
-        diagnoses_(diagnoses),
-        now_utime_us_(std::move(now_utime_us)),
-        options_(options),
-        on_error_(std::move(on_error)) {}
+  GapWatch(Parts parts, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
+           const WatchOptions& options)
+      : parts_(std::move(parts)), forecasts_(forecasts), diagnoses_(diagnoses), options_(options) {}
 
   void start();
   void stop() { thread_ = {}; }
@@ -94,15 +84,10 @@ class GapWatch {
   bool is_own(const std::string& robot_id) const;
   void record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
-  const history::Store& store_;
-  history::Writer& writer_;
-  const ingest::ModelRegistry& models_;
-  const DriftView& drift_;
+  const Parts parts_;
   ingest::Forecasts& forecasts_;
   DiagnosisService& diagnoses_;
-  std::function<std::int64_t()> now_utime_us_;
   WatchOptions options_;
-  std::function<void(const Error&)> on_error_;
   std::mutex looking_;
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;

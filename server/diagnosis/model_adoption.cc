@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "answers/mission.h"
+#include "base/json_number.h"
 #include "base/try.h"
 #include "robot/robot_file.h"
 
@@ -68,12 +69,12 @@ Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
   since_utime_us = request.since_utime_us;
   if (!since_utime_us) {
     for (const history::MissionKey key : request.fitted_on)
-      if (const auto mission = store_.mission(key))
+      if (const auto mission = parts_.store.mission(key))
         since_utime_us = std::min(since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
-    TRY_ASSIGN(const auto change, drift_.last_change(wanted.robot_id, before.version));
+    TRY_ASSIGN(const auto change, parts_.drift.last_change(wanted.robot_id, before.version));
     if (change && change > since_utime_us) {
       wanted.since_utime_us = change;
-      Result<StoredRecordings> recent = read_recordings(store_, wanted);
+      Result<StoredRecordings> recent = read_recordings(parts_.store, wanted);
       if (!recent || recent->missions.size() >= enough_missions) {
         since_utime_us = change;
         return recent;
@@ -81,7 +82,7 @@ Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
     }
   }
   wanted.since_utime_us = since_utime_us;
-  return read_recordings(store_, wanted);
+  return read_recordings(parts_.store, wanted);
 }
 
 Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::ModelInForce& before,
@@ -113,12 +114,6 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   return {};
 }
 
-std::vector<history::MissionKey> Adoption::tested_on() const {
-  std::vector<history::MissionKey> keys;
-  for (const energy::RunComparison& run : test.runs) keys.push_back(run.id.value());
-  return keys;
-}
-
 const described::Table<Adoption>& back_test_table() {
   using A = Adoption;
   static const auto left_out =
@@ -148,7 +143,7 @@ const described::Table<Adoption>& back_test_table() {
 Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on,
                                       const std::function<history::Change(const Adoption&)>& closing) {
   const std::string& robot_id = request.model.robot_id;
-  const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
+  const std::shared_ptr<const ingest::ModelInForce> before = parts_.models.find(robot_id);
   if (before == nullptr)
     return fail(Fault::not_found, "id",
                 "robot " + robot_id + " has no model to test a new one against: add its robot file");
@@ -174,7 +169,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   if (request.proposal_id) evidence["proposal_id"] = *request.proposal_id;
   history::AddModel command;
   command.robot_id = robot_id;
-  command.utime_us = now_utime_us_();
+  command.utime_us = parts_.now_utime_us();
   command.origin = request.origin;
   command.note = request.note;
   command.model_json = robot::to_json_text(request.model);
@@ -205,20 +200,20 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
 
 Result<std::int64_t> ModelAdoption::put(history::Change change, const robot::RobotModel& model) {
   const std::lock_guard lock(putting_);
-  TRY_ASSIGN(const std::int64_t version, writer_.execute(std::move(change)));
-  TRY(models_.put(model, version));
+  TRY_ASSIGN(const std::int64_t version, parts_.writer.execute(std::move(change)));
+  TRY(parts_.models.put(model, version));
   return version;
 }
 
 Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model, history::Change closing) {
-  if (models_.find(model.robot_id) == nullptr && models_.size() >= options_.most_robots)
+  if (parts_.models.find(model.robot_id) == nullptr && parts_.models.size() >= options_.most_robots)
     return fail(Fault::conflict, "id",
-                std::to_string(models_.size()) +
+                std::to_string(parts_.models.size()) +
                     " robots have a model, and no more may (robots.most): DELETE one that is gone, or raise "
                     "robots.most");
   history::AddModel command;
   command.robot_id = model.robot_id;
-  command.utime_us = now_utime_us_();
+  command.utime_us = parts_.now_utime_us();
   command.origin = history::ModelOrigin::http;
   command.model_json = robot::to_json_text(model);
   closing.command = std::move(command);
@@ -228,20 +223,20 @@ Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model, history:
 Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::int64_t version,
                                              const std::string& note,
                                              const std::function<history::Change(std::int64_t)>& closing) {
-  TRY_ASSIGN(history::ModelVersion stored, store_.model(robot_id, version));
+  TRY_ASSIGN(history::ModelVersion stored, parts_.store.model(robot_id, version));
   TRY_ASSIGN(robot::RobotModel robot, robot::parse_robot(stored.model_json));
   const std::lock_guard lock(putting_);
-  const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
+  const std::shared_ptr<const ingest::ModelInForce> before = parts_.models.find(robot_id);
   const std::int64_t previous = before != nullptr ? before->version : 0;
   if (previous == version) return previous;
   const Json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
   history::Change change = closing ? closing(previous) : history::Change{};
   change.command = history::ActivateModel{robot_id, version};
-  change.add_before([event = history::Event{0, now_utime_us_(), robot_id, "model_activated",
-                                            detail.dump(-1, ' ', false, Json::error_handler_t::replace)}](
-                        std::int64_t) { return std::vector<history::Command>{history::AppendEvent{event}}; });
-  TRY(writer_.execute(std::move(change)));
-  TRY(models_.put(std::move(robot), version));
+  change.add_before(
+      [event = history::Event{0, parts_.now_utime_us(), robot_id, "model_activated", json_text(detail)}](
+          std::int64_t) { return std::vector<history::Command>{history::AppendEvent{event}}; });
+  TRY(parts_.writer.execute(std::move(change)));
+  TRY(parts_.models.put(std::move(robot), version));
   return previous;
 }
 

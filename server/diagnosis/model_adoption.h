@@ -50,8 +50,6 @@ struct Adoption {
   std::optional<std::int64_t> since_utime_us;  // tested on missions from then on; absent: on any
   std::string refusal;  // why it was not adopted; empty when it was, or on a dry run of one that would be
   std::string back_test_json;  // by back_test_table()
-
-  std::vector<history::MissionKey> tested_on() const;  // in the order of test.runs
 };
 
 const described::Table<Adoption>& back_test_table();
@@ -78,15 +76,7 @@ struct AdoptionOptions {
 // telemetry without declared missions may run for days and changes over immediately.
 class ModelAdoption {
  public:
-  ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
-                const DriftView& drift, std::function<std::int64_t()> now_utime_us,
-                const AdoptionOptions& options)
-      : store_(store),
-        writer_(writer),
-        models_(models),
-        drift_(drift),
-        now_utime_us_(std::move(now_utime_us)),
-        options_(options) {}
+  ModelAdoption(Parts parts, const AdoptionOptions& options) : parts_(std::move(parts)), options_(options) {}
 
   // Fault::not_found: the robot has no model to test against; ::invalid: the candidate is no valid model;
   // ::conflict: another model came in force meanwhile; ::unavailable: another back-test is running, or the
@@ -114,11 +104,7 @@ class ModelAdoption {
   // Stores the model and puts it in force.
   Result<std::int64_t> put(history::Change change, const robot::RobotModel& model);
 
-  const history::Store& store_;
-  history::Writer& writer_;
-  ingest::ModelRegistry& models_;
-  const DriftView& drift_;
-  std::function<std::int64_t()> now_utime_us_;
+  const Parts parts_;
   AdoptionOptions options_;
   std::atomic<std::uint64_t> adopted_ = 0, forced_ = 0, refused_ = 0;
   std::mutex testing_;  // one back-test at a time

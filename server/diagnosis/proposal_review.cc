@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/fault_boundary.h"
+#include "base/json_number.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "robot/robot_file.h"
@@ -65,7 +66,7 @@ int ProposalReview::look() {
     suggested.swap(suggested_);
     ended.swap(ended_);
   }
-  if (const Result<void> stored = writer_.flush(); !stored) options_.warn("", describe(stored.error()));
+  if (const Result<void> stored = parts_.writer.flush(); !stored) options_.warn("", describe(stored.error()));
   const auto warn_of = [this](const std::string& robot_id, const Error& error) {
     options_.warn(robot_id, "a proposal was not reviewed: " + describe(error));
   };
@@ -81,18 +82,20 @@ int ProposalReview::look() {
 }
 
 Result<std::optional<history::Proposal>> ProposalReview::open_of(const std::string& robot_id) const {
-  TRY_ASSIGN(const auto listed, store_.proposals(robot_id, history::whole_future, 1));
+  TRY_ASSIGN(const auto listed, parts_.store.proposals(robot_id, history::whole_future, 1));
   if (listed.empty() || listed.front().state != history::ProposalState::open) return std::nullopt;
-  return store_.proposal(listed.front().id).map([](auto found) { return std::optional(std::move(found)); });
+  return parts_.store.proposal(listed.front().id).map([](auto found) {
+    return std::optional(std::move(found));
+  });
 }
 
 Result<std::optional<history::DiagnosisRecord>> ProposalReview::remedy(
     const std::string& robot_id, std::optional<std::int64_t> version) const {
-  TRY_ASSIGN(const auto listed, store_.diagnoses(robot_id, history::whole_future, newest_diagnoses));
+  TRY_ASSIGN(const auto listed, parts_.store.diagnoses(robot_id, history::whole_future, newest_diagnoses));
   for (const history::DiagnosisRecord& d : listed) {
     if (d.state != history::DiagnosisState::done || d.model_version != version) continue;
-    TRY_ASSIGN(history::DiagnosisRecord diagnosis, store_.diagnosis(d.id));
-    const Result<DiagnosedModel> model = diagnosed_model(store_, diagnosis, {});
+    TRY_ASSIGN(history::DiagnosisRecord diagnosis, parts_.store.diagnosis(d.id));
+    const Result<DiagnosedModel> model = diagnosed_model(parts_.store, diagnosis, {});
     if (!model) return std::nullopt;
     diagnosis.model_json = robot::to_json_text(model->model);
     return diagnosis;
@@ -116,7 +119,7 @@ Result<bool> ProposalReview::review(history::Proposal candidate) {
   }
   detail["back_test"] = Json::parse(tested.back_test_json);
   candidate.detail_json = detail.dump();
-  TRY_ASSIGN(const std::int64_t id, writer_.execute(history::AddProposal{std::move(candidate)}));
+  TRY_ASSIGN(const std::int64_t id, parts_.writer.execute(history::AddProposal{std::move(candidate)}));
   if (!options_.automatic) return true;
   request.dry_run = false;
   request.proposal_id = id;
@@ -127,7 +130,7 @@ Result<void> ProposalReview::review_open(const std::string& robot_id) {
   TRY_ASSIGN(const auto open, open_of(robot_id));
   if (!open) return {};
   const Json detail = detail_of(*open);
-  TRY_ASSIGN(const auto marks, drift_.marks(robot_id));
+  TRY_ASSIGN(const auto marks, parts_.drift.marks(robot_id));
   if (!marks.empty() && marks.back().utime_us > detail.value("fitted_until_utime_us", std::int64_t{0}))
     return dismiss(*open, "the robot changed on " + utc_text(marks.back().utime_us).substr(0, 10) +
                               ", after the missions that it was fitted on");
@@ -147,10 +150,10 @@ Result<void> ProposalReview::review_open(const std::string& robot_id) {
 }
 
 Result<void> ProposalReview::dismiss(const history::Proposal& proposal, const std::string& reason) {
-  TRY(writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}}));
+  TRY(parts_.writer.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}}));
   const Json detail{{"proposal_id", proposal.id}, {"reason", reason}};
-  return writer_.offer(history::AppendEvent{{0, now_utime_us_(), proposal.robot_id, "proposal_dismissed",
-                                             detail.dump(-1, ' ', false, Json::error_handler_t::replace)}});
+  return parts_.writer.offer(history::AppendEvent{
+      {0, parts_.now_utime_us(), proposal.robot_id, "proposal_dismissed", json_text(detail)}});
 }
 
 void ProposalReview::start() {

@@ -28,14 +28,8 @@ struct ReviewOptions {
 // whose robot changed since, is dismissed with the reason as an event "proposal_dismissed".
 class ProposalReview {
  public:
-  ProposalReview(const history::Store& store, history::Writer& writer, ModelAdoption& adoption,
-                 const DriftView& drift, std::function<std::int64_t()> now_utime_us, ReviewOptions options)
-      : store_(store),
-        writer_(writer),
-        adoption_(adoption),
-        drift_(drift),
-        now_utime_us_(std::move(now_utime_us)),
-        options_(std::move(options)) {}
+  ProposalReview(Parts parts, ModelAdoption& adoption, ReviewOptions options)
+      : parts_(std::move(parts)), adoption_(adoption), options_(std::move(options)) {}
 
   // To be called by sessions; do not wait.
   void suggest(history::Proposal candidate);
@@ -58,11 +52,8 @@ class ProposalReview {
                                                          std::optional<std::int64_t> version) const;
   Result<void> dismiss(const history::Proposal& proposal, const std::string& reason);
 
-  const history::Store& store_;
-  history::Writer& writer_;
+  const Parts parts_;
   ModelAdoption& adoption_;
-  const DriftView& drift_;
-  std::function<std::int64_t()> now_utime_us_;
   ReviewOptions options_;
   std::mutex mutex_;
   std::condition_variable_any wake_;

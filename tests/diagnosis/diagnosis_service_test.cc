@@ -18,6 +18,7 @@ using history::DiagnosisState;
 using nlohmann::json;
 using testing::drive;
 using testing::nomad_with_friction;
+using testing::tested_on;
 
 constexpr std::int64_t start_us = 1'750'000'000'000'000;
 
@@ -27,12 +28,19 @@ class DiagnosisServiceTest : public ::testing::Test {
 
   void serve(DiagnosisOptions options = {}) {
     writer_ = std::make_unique<history::Writer>(*harness_.store, history::WriterOptions{});
-    service_ = std::make_unique<DiagnosisService>(
-        *harness_.store, *writer_, harness_.models, drift_, [] { return 42; }, options,
-        [this](const Error& error) { errors_.push_back(describe(error)); },
-        [this](const history::DiagnosisRecord& d) {
-          if (watch_) watch_->on_diagnosis(d);
-        });
+    service_ = std::make_unique<DiagnosisService>(parts(drift_, 42), options,
+                                                  [this](const history::DiagnosisRecord& d) {
+                                                    if (watch_) watch_->on_diagnosis(d);
+                                                  });
+  }
+
+  Parts parts(const DriftView& drift, std::int64_t now_utime_us) {
+    return {*harness_.store,
+            *writer_,
+            harness_.models,
+            drift,
+            [now_utime_us] { return now_utime_us; },
+            [this](const Error& error) { errors_.push_back(describe(error)); }};
   }
 
   history::DiagnosisRecord wait_for(std::int64_t id) {
@@ -91,14 +99,14 @@ TEST_F(DiagnosisServiceTest, FindsAdoptableEffect) {
   EXPECT_EQ(summary["effects"][0]["probability"], result["effects"][0]["probability"]);
   EXPECT_EQ(summary["effects"].size(), result["effects"].size());
 
-  ModelAdoption adoption(*harness_.store, *writer_, harness_.models, drift_, [] { return 43; }, {});
+  ModelAdoption adoption(parts(drift_, 43), {});
   AdoptionRequest adopt;
   adopt.model = *robot::parse_robot(d.model_json);
   adopt.fitted_on = d.fitted_on;
   const auto adopted = adoption.adopt(adopt);
   ASSERT_TRUE(adopted) << describe(adopted.error());
   EXPECT_TRUE(adopted->adopted) << adopted->refusal;
-  EXPECT_EQ(adopted->tested_on(), d.held_back);
+  EXPECT_EQ(tested_on(*adopted), d.held_back);
   EXPECT_LT(adopted->test.error_after, 0.2 * adopted->test.error_before);
   EXPECT_EQ(service_->counts().done, 1U);
   EXPECT_TRUE(errors_.empty());
@@ -218,9 +226,7 @@ class GapWatchTest : public DiagnosisServiceTest {
     serve();
     WatchOptions options;
     options.diagnose = diagnose;
-    watch_ = std::make_unique<GapWatch>(
-        *harness_.store, *writer_, harness_.models, drift_, forecasts_, *service_, [] { return 44; }, options,
-        [this](const Error& error) { errors_.push_back(describe(error)); });
+    watch_ = std::make_unique<GapWatch>(parts(drift_, 44), forecasts_, *service_, options);
   }
 
   std::vector<history::Event> events(const std::string& kind) {
@@ -301,9 +307,7 @@ TEST_F(GapWatchTest, AppliesLeastChangeEverywhere) {
   EXPECT_TRUE(patient.marks("nomad")->empty());
   EXPECT_FALSE(*patient.last_change("nomad", 1));
   serve();
-  GapWatch watch(
-      *harness_.store, *writer_, harness_.models, patient, forecasts_, *service_, [] { return 44; }, {},
-      [this](const Error& error) { errors_.push_back(describe(error)); });
+  GapWatch watch(parts(patient, 44), forecasts_, *service_, {});
   watch.look();
   EXPECT_EQ(watch.counts().drifting, 0U);
   EXPECT_TRUE(events("gap_drift").empty());

@@ -3,16 +3,24 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "client/virtual_robot/fleet.h"
 #include "dynamics/drive_model.h"
 #include "history/writer.h"
+#include "server/diagnosis/model_adoption.h"
 #include "signals/mission_event.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 #include "tests/support/simulated_missions.h"
 
 namespace joulecast::testing {
+
+inline std::vector<history::MissionKey> tested_on(const server::Adoption& adoption) {
+  std::vector<history::MissionKey> keys;
+  for (const energy::RunComparison& run : adoption.test.runs) keys.push_back(run.id.value());
+  return keys;
+}
 
 inline robot::RobotModel nomad_with_friction(double factor) {
   robot::RobotModel robot = nomad();

@@ -14,6 +14,7 @@ namespace {
 using nlohmann::json;
 using testing::drive;
 using testing::nomad_with_friction;
+using testing::tested_on;
 
 class ModelAdoptionTest : public ::testing::Test {
  protected:
@@ -22,7 +23,7 @@ class ModelAdoptionTest : public ::testing::Test {
     for (int number = 0; number < 4; ++number) keys_.push_back(drive(harness_, truth_, number));
     writer_ = std::make_unique<history::Writer>(*harness_.store, history::WriterOptions{});
     adoption_ = std::make_unique<ModelAdoption>(
-        *harness_.store, *writer_, harness_.models, drift_, [] { return 42; }, AdoptionOptions{});
+        Parts{*harness_.store, *writer_, harness_.models, drift_, [] { return 42; }}, AdoptionOptions{});
   }
 
   AdoptionRequest candidate(double friction) const {
@@ -54,7 +55,7 @@ TEST_F(ModelAdoptionTest, AdoptsBetterModel) {
   EXPECT_TRUE(adoption->adopted) << adoption->refusal;
   EXPECT_EQ(adoption->version, 2);
   EXPECT_EQ(adoption->previous_version, 1);
-  EXPECT_EQ(adoption->tested_on(), (std::vector<history::MissionKey>{keys_[1], keys_[2], keys_[3]}));
+  EXPECT_EQ(tested_on(*adoption), (std::vector<history::MissionKey>{keys_[1], keys_[2], keys_[3]}));
   EXPECT_EQ(adoption->left_out.excepted, 1U);
   EXPECT_GT(adoption->test.error_before, 0.05);
   EXPECT_LT(adoption->test.error_after, 0.005);
@@ -79,7 +80,7 @@ TEST_F(ModelAdoptionTest, OmitsChargingSamples) {
   ASSERT_GT(harness_.missions().back().sample_faults["charging"], 900);
   const auto adoption = adoption_->adopt(candidate(1.4));
   ASSERT_TRUE(adoption) << describe(adoption.error());
-  ASSERT_EQ(adoption->tested_on().back(), keys_.back());
+  ASSERT_EQ(tested_on(*adoption).back(), keys_.back());
   // 3 A into the battery for 20 s are some 1,500 J, more than the drive costs.
   EXPECT_LT(std::fabs(adoption->test.runs.back().after.relative), 0.01);
   const json report = json::parse(adoption->back_test_json);
@@ -93,13 +94,13 @@ TEST_F(ModelAdoptionTest, UsesMissionsSinceChange) {
   AdoptionRequest request = candidate(2);
   request.dry_run = true;
   request.fitted_on = {keys_[0], keys_[4], keys_[5]};  // two are too few since the change: all are used
-  EXPECT_EQ(adoption_->adopt(request)->tested_on().size(), 5U);
+  EXPECT_EQ(tested_on(*adoption_->adopt(request)).size(), 5U);
   request.dry_run = false;
   request.fitted_on.clear();
   const auto adoption = adoption_->adopt(request);
   ASSERT_TRUE(adoption) << describe(adoption.error());
   EXPECT_TRUE(adoption->adopted) << adoption->refusal;
-  EXPECT_EQ(adoption->tested_on(), (std::vector<history::MissionKey>(keys_.begin() + 4, keys_.end())));
+  EXPECT_EQ(tested_on(*adoption), (std::vector<history::MissionKey>(keys_.begin() + 4, keys_.end())));
   EXPECT_LT(adoption->test.error_after, 0.005);
   EXPECT_EQ(json::parse(adoption->back_test_json)["since_utime_us"], harness_.missions()[4].start_utime_us);
 }

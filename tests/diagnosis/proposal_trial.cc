@@ -34,13 +34,13 @@ json run(const Trial& trial, std::uint64_t seed) {
   harness.add_robot(robot);
   history::Writer writer(*harness.store, history::WriterOptions{});
   const DriftView drift(*harness.store, harness.models, {});
-  const auto now = [] { return std::int64_t{42}; };
-  ModelAdoption adoption(*harness.store, writer, harness.models, drift, now, {});
+  const Parts parts{*harness.store, writer, harness.models, drift, [] { return 42; }};
+  ModelAdoption adoption(parts, {});
   ReviewOptions options;
   options.warn = [](const std::string&, const std::string& text) {
     std::fprintf(stderr, "%s\n", text.c_str());
   };
-  ProposalReview review(*harness.store, writer, adoption, drift, now, options);
+  ProposalReview review(parts, adoption, options);
 
   json out{{"robot", robot.robot_id}, {"seed", seed}, {"unchanged", trial.unchanged}};
   out["marks"] = out["proposals"] = out["dismissed"] = json::array();

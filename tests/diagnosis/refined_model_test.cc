@@ -91,13 +91,12 @@ TEST(RefinedModel, IsProposedAndAdopted) {
 
   history::Writer writer(*harness.store, history::WriterOptions{});
   const DriftView drift(*harness.store, harness.models, {});
-  ModelAdoption adoption(
-      *harness.store, writer, harness.models, drift, [] { return 42; }, AdoptionOptions{});
+  const Parts parts{*harness.store, writer, harness.models, drift, [] { return 42; }};
+  ModelAdoption adoption(parts, AdoptionOptions{});
   std::vector<std::string> warnings;
   ReviewOptions options;
   options.warn = [&](const std::string&, const std::string& text) { warnings.push_back(text); };
-  ProposalReview review(
-      *harness.store, writer, adoption, drift, [] { return 42; }, options);
+  ProposalReview review(parts, adoption, options);
   // A candidate that would make the model worse is not stored.
   history::Proposal worse = newest;
   json model = json::parse(newest.model_json);
@@ -132,8 +131,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
       << dismissed.back().detail_json;
   EXPECT_EQ(harness.models.find(robot.robot_id)->version, 1);
   options.automatic = true;
-  ProposalReview automatic(
-      *harness.store, writer, adoption, drift, [] { return 42; }, options);
+  ProposalReview automatic(parts, adoption, options);
   automatic.suggest(newest);
   EXPECT_EQ(automatic.look(), 1) << (warnings.empty() ? "" : warnings.front());
   EXPECT_EQ(stored()[0].state, history::ProposalState::adopted);
