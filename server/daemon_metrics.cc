@@ -171,14 +171,17 @@ double open_files() {
 }
 
 AllSeries read_process() {
+  Series build{"joulecast_build_info", "1; the labels contain the version and the compiler"};
+  build.rows = {{{{"version", JOULECAST_VERSION}, {"compiler", "g++ " __VERSION__}}, 1}};
   const std::vector<double> stat = stat_fields();
-  if (stat.size() < 21) return {};
+  if (stat.size() < 21) return {build};
   // Its fields are counted from 1, and the first of `stat` is the fourth.
   const auto field = [&](std::size_t number) { return stat[number - 4]; };
   const auto ticks = static_cast<double>(sysconf(_SC_CLK_TCK));
   rlimit files{};
   getrlimit(RLIMIT_NOFILE, &files);
   return {
+      build,
       {"process_cpu_seconds_total", "User and system CPU time", (field(14) + field(15)) / ticks},
       {"process_start_time_seconds", "Start of the process since 1970", boot_time_s() + field(22) / ticks},
       {"process_threads", "Threads", field(20)},
@@ -319,10 +322,6 @@ void export_mqtt_metrics(Metrics& metrics, const BatteryTopics& topics) {
 }
 
 void export_process_metrics(Metrics& metrics) {
-  metrics
-      .gauge("joulecast_build_info", "1; the labels contain the version and the compiler",
-             {{"version", JOULECAST_VERSION}, {"compiler", "g++ " __VERSION__}})
-      .set(1);
   metrics.series(read_process);
 }
 

@@ -1,7 +1,6 @@
 #include "server/metrics.h"
 
 #include <prometheus/counter.h>
-#include <prometheus/gauge.h>
 #include <prometheus/histogram.h>
 #include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
@@ -28,28 +27,6 @@ void check_name(const std::string& name, bool is_counter) {
   std::abort();
 }
 
-}  // namespace
-
-void Counter::add(double amount) const {
-  if (counter_ != nullptr) counter_->Increment(amount);
-}
-
-void Gauge::set(double value) const {
-  if (gauge_ != nullptr) gauge_->Set(value);
-}
-
-void Histogram::observe(double value) const {
-  if (histogram_ != nullptr) histogram_->Observe(value);
-}
-
-struct Metrics::State {
-  prometheus::Registry registry;
-  mutable std::mutex mutex;
-  std::vector<std::function<std::vector<Series>()>> readers;
-};
-
-namespace {
-
 prometheus::MetricFamily family_of(const Metrics::Series& series) {
   const bool counter = series.name.ends_with("_total");
   check_name(series.name, counter);
@@ -67,6 +44,20 @@ prometheus::MetricFamily family_of(const Metrics::Series& series) {
 
 }  // namespace
 
+void Counter::add(double amount) const {
+  if (counter_ != nullptr) counter_->Increment(amount);
+}
+
+void Histogram::observe(double value) const {
+  if (histogram_ != nullptr) histogram_->Observe(value);
+}
+
+struct Metrics::State {
+  prometheus::Registry registry;
+  mutable std::mutex mutex;
+  std::vector<std::function<std::vector<Series>()>> readers;
+};
+
 Metrics::Metrics() : state_(std::make_unique<State>()) {}
 Metrics::~Metrics() = default;
 
@@ -74,12 +65,6 @@ Counter Metrics::counter(const std::string& name, const std::string& help, const
   check_name(name, true);
   return Counter(
       &prometheus::BuildCounter().Name(name).Help(help).Register(state_->registry).Add(to_map(labels)));
-}
-
-Gauge Metrics::gauge(const std::string& name, const std::string& help, const Labels& labels) {
-  check_name(name, false);
-  return Gauge(
-      &prometheus::BuildGauge().Name(name).Help(help).Register(state_->registry).Add(to_map(labels)));
 }
 
 Histogram Metrics::histogram(const std::string& name, const std::string& help,

@@ -9,7 +9,6 @@
 
 namespace prometheus {
 class Counter;
-class Gauge;
 class Histogram;
 }  // namespace prometheus
 
@@ -27,17 +26,6 @@ class Counter {
   friend class Metrics;
   explicit Counter(prometheus::Counter* counter) : counter_(counter) {}
   prometheus::Counter* counter_ = nullptr;  // null: counts nothing
-};
-
-class Gauge {
- public:
-  Gauge() = default;
-  void set(double value) const;
-
- private:
-  friend class Metrics;
-  explicit Gauge(prometheus::Gauge* gauge) : gauge_(gauge) {}
-  prometheus::Gauge* gauge_ = nullptr;
 };
 
 class Histogram {
@@ -60,7 +48,6 @@ class Metrics {
 
   // The same name and labels give the same metric. A name that violates the convention aborts.
   Counter counter(const std::string& name, const std::string& help, const Labels& labels = {});
-  Gauge gauge(const std::string& name, const std::string& help, const Labels& labels = {});
   Histogram histogram(const std::string& name, const std::string& help,
                       const std::vector<double>& upper_bounds, const Labels& labels = {});
   // One counter for each value of a label, all present from the start at zero, in the order of the values.

@@ -32,6 +32,13 @@ const Table<Version>& version_table() {
   return table;
 }
 
+std::vector<std::string> refusal_names() {
+  std::vector<std::string> names;
+  for (unsigned i = 0; i < static_cast<unsigned>(Refusal::count_); ++i)
+    names.emplace_back(to_string(static_cast<Refusal>(i)));
+  return names;
+}
+
 }  // namespace
 
 described::Schemas operations_schemas() {
@@ -121,25 +128,17 @@ Endpoint events_endpoint(EventHub& hub) {
           }};
 }
 
-namespace {
-
-std::vector<std::string> refusal_names() {
-  std::vector<std::string> names;
-  for (unsigned i = 0; i < static_cast<unsigned>(Refusal::count_); ++i)
-    names.emplace_back(to_string(static_cast<Refusal>(i)));
-  return names;
-}
-
-}  // namespace
-
 HttpMetrics::HttpMetrics(Metrics& metrics)
     : metrics_(metrics),
       refusals_(metrics.counters("joulecast_http_refused_total",
                                  "Requests or connections that the server ended on its own, by reason",
                                  "reason", refusal_names())),
       sent_bytes_(metrics.counter("joulecast_http_sent_bytes_total", "Bytes of answers")),
-      received_bytes_(metrics.counter("joulecast_http_received_bytes_total", "Bytes of requests")),
-      connections_(metrics.gauge("joulecast_http_connections", "Connections open now")) {}
+      received_bytes_(metrics.counter("joulecast_http_received_bytes_total", "Bytes of requests")) {
+  metrics.series([this]() -> std::vector<Metrics::Series> {
+    return {{"joulecast_http_connections", "Connections open now", connections_.load()}};
+  });
+}
 
 void HttpMetrics::exchanged(const Exchange& exchange) {
   auto [place, fresh] = series_.try_emplace({exchange.operation.data(), exchange.status});
@@ -164,7 +163,7 @@ void HttpMetrics::refused(Refusal refusal) {
 }
 
 void HttpMetrics::connections(std::size_t open) {
-  connections_.set(static_cast<double>(open));
+  connections_ = open;
 }
 
 }  // namespace joulecast::http

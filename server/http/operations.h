@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <string>
@@ -53,7 +55,7 @@ class HttpMetrics : public ServerObserver {
   std::vector<Counter> refusals_;
   Counter sent_bytes_;
   Counter received_bytes_;
-  Gauge connections_;
+  std::atomic<std::size_t> connections_ = 0;
 };
 
 }  // namespace joulecast::http

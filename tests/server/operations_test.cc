@@ -73,12 +73,14 @@ TEST_F(OperationsTest, ReadyRequiresEveryCheck) {
 TEST_F(OperationsTest, ShowsMetrics) {
   const Counter counter = metrics_.counter("joulecast_test_total", "test", {{"reason", "a"}});
   counter.add(5);
-  metrics_.gauge("joulecast_test_seconds", "test").set(1.5);
   metrics_.histogram("joulecast_wait_seconds", "test", {0.1, 1}).observe(0.5);
   const auto drops = metrics_.counters("joulecast_drops_total", "test", "reason", {"late", "duplicate"});
   drops[1].add();
   int refreshed = 0;
-  metrics_.series([&] { return std::vector<Metrics::Series>{{"joulecast_refreshed", "test", ++refreshed}}; });
+  metrics_.series([&] {
+    return std::vector<Metrics::Series>{{"joulecast_refreshed", "test", ++refreshed},
+                                        {"joulecast_test_seconds", "test", 1.5}};
+  });
   const Response response = get(*router_, "/metrics");
   EXPECT_TRUE(response.content_type.starts_with("text/plain; version=0.0.4"));
   for (const char* line :
@@ -240,8 +242,8 @@ TEST(Logging, WritesJsonLines) {
 TEST(MetricsDeathTest, NamesFollowTheConvention) {
   Metrics metrics;
   EXPECT_DEATH(metrics.counter("joulecast_things", ""), "convention");
-  EXPECT_DEATH(metrics.gauge("joulecast_things_total", ""), "convention");
-  EXPECT_DEATH(metrics.gauge("things_seconds", ""), "convention");
+  EXPECT_DEATH(metrics.histogram("joulecast_things_total", "", {}), "convention");
+  EXPECT_DEATH(metrics.histogram("things_seconds", "", {}), "convention");
 }
 
 }  // namespace
