@@ -1,11 +1,13 @@
 #include "server/settings.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/bounds.h"
+#include "base/json_number.h"
 #include "base/json_text.h"
 #include "base/nearest_word.h"
 #include "base/text_file.h"
@@ -17,27 +19,30 @@ namespace {
 
 using http::number_text;
 
-const Setting* find_setting(std::string_view key) {
-  for (const Setting& setting : settings_table()) {
-    if (setting.key == key) return &setting;
+// The setting of that name in the file, as a flag or in the environment; else an error that suggests one.
+// `others`: names that are no settings.
+template <class Name>
+Result<const Setting*> setting_called(std::string_view name, Name name_of, const char* what,
+                                      const std::vector<std::string_view>& others = {}) {
+  std::vector<std::string> known;
+  for (const Setting& each : settings_table()) {
+    known.emplace_back(std::invoke(name_of, each));
+    if (known.back() == name) return &each;
   }
-  return nullptr;
+  known.insert(known.end(), others.begin(), others.end());
+  return invalid(std::string(name), fmt::format("unknown {}{}", what, did_you_mean(name, known)));
 }
 
 using Type = Target::Type;
 
 std::string joined(const auto& texts) {
-  std::string all;
-  for (const std::string& text : texts) all += (all.empty() ? "" : ",") + text;
-  return all;
+  return fmt::format("{}", fmt::join(texts, ","));
 }
 
 std::string kind(const Target& member) {
   static constexpr const char* kinds[] = {"text", "integer", "number", "true|false"};
   if (member.type != Type::choice) return kinds[static_cast<std::size_t>(member.type)];
-  std::string choices;
-  for (const std::string_view name : member.names) choices.append(choices.empty() ? "" : "|").append(name);
-  return choices;
+  return fmt::format("{}", fmt::join(member.names, "|"));
 }
 
 // Member of the options that no one reads, for types and defaults.
@@ -100,6 +105,98 @@ struct Pending {
   std::string value;
   std::string where;
 };
+
+using Action = Invocation::Action;
+
+constexpr std::array<std::pair<std::string_view, Action>, 10> actions{{
+    {"--help", Action::help},
+    {"--version", Action::version},
+    {"--check-config", Action::check_config},
+    {"--print-config", Action::print_config},
+    {"--print-openapi", Action::print_openapi},
+    {"--print-config-schema", Action::print_config_schema},
+    {"--check-store", Action::check_store},
+    {"--backup", Action::backup},
+    {"--restore", Action::restore},
+    {"--salvage", Action::salvage},
+}};
+
+bool names_a_file(Action action) {
+  return action == Action::backup || action == Action::restore || action == Action::salvage;
+}
+
+// The values of flags and environment before they are in force.
+struct Given {
+  std::optional<Action> action;
+  std::string file;  // of the action
+  std::optional<std::string> config;
+  std::vector<Pending> flags, variables;
+};
+
+// Null: of the settings file.
+Result<const Setting*> setting_of_flag(const std::string& name) {
+  if (name == "--config") return nullptr;
+  std::vector<std::string_view> others;
+  for (const auto& each : actions) others.push_back(each.first);
+  others.push_back("--config");
+  return setting_called(name, &Setting::flag, "flag", others);
+}
+
+Result<void> read_flags(const std::vector<std::string>& arguments, Given& given) {
+  for (std::size_t i = 0; i < arguments.size(); ++i) {
+    const std::string& argument = arguments[i];
+    const auto action = std::find_if(actions.begin(), actions.end(),
+                                     [&](const auto& each) { return each.first == argument; });
+    if (action != actions.end()) {
+      if (given.action.value_or(action->second) != action->second)
+        return invalid(argument, "only one such command can be given");
+      given.action = action->second;
+      if (names_a_file(action->second)) {
+        if (i + 1 == arguments.size() || arguments[i + 1].empty()) return invalid(argument, "needs a file");
+        given.file = arguments[++i];
+      }
+      continue;
+    }
+    const auto equals = argument.find('=');
+    const std::string name = argument.substr(0, equals);
+    TRY_ASSIGN(const auto setting, setting_of_flag(name));
+    if (equals == std::string::npos && i + 1 == arguments.size()) return invalid(name, "needs a value");
+    std::string value = equals == std::string::npos ? arguments[++i] : argument.substr(equals + 1);
+    const bool repeated =
+        setting == nullptr
+            ? given.config.has_value()
+            : std::ranges::any_of(given.flags, [&](const Pending& each) { return each.where == name; });
+    if (repeated) return invalid(name, "is given more than once");
+    if (setting == nullptr)
+      given.config = std::move(value);
+    else
+      given.flags.push_back({std::string(setting->key), std::move(value), name});
+  }
+  return {};
+}
+
+constexpr std::string_view of_the_command_line[] = {"JOULECAST_SERVER", "JOULECAST_TOKEN",
+                                                    "JOULECAST_CLIENT_CERTIFICATE", "JOULECAST_CLIENT_KEY"};
+
+void read_environment(const std::vector<std::string>& environment, Given& given, Problems& problems) {
+  for (const std::string& entry : environment) {
+    if (!entry.starts_with("JOULECAST_")) continue;
+    const auto equals = entry.find('=');
+    const std::string name = entry.substr(0, equals);
+    std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
+    if (name == "JOULECAST_CONFIG") {
+      if (!given.config) given.config = std::move(value);
+      continue;
+    }
+    if (std::ranges::find(of_the_command_line, name) != std::end(of_the_command_line)) continue;
+    const auto setting =
+        setting_called(name, &Setting::environment, "environment variable", {"JOULECAST_CONFIG"});
+    if (setting)
+      given.variables.push_back({std::string((*setting)->key), std::move(value), name});
+    else
+      problems.add(tl::unexpected(setting.error()));
+  }
+}
 
 }  // namespace
 
@@ -182,11 +279,11 @@ Origin Settings::origin(std::string_view key) const {
 
 Result<void> Settings::set(std::string_view key, std::string_view value, Origin origin,
                            std::string_view where) {
-  const Setting* setting = find_setting(key);
-  if (setting == nullptr) {
-    return invalid(std::string(where),
-                   "unknown setting" + did_you_mean(key, settings_table(), &Setting::key));
-  }
+  const auto named = [&](Error error) {
+    error.field = where;
+    return error;
+  };
+  TRY_ASSIGN(const Setting* setting, setting_called(key, &Setting::key, "setting").map_error(named));
   if (auto broken = put(*setting, value, setting->member(options_)))
     return invalid(std::string(where), std::move(*broken));
   origins_[setting->key] = origin;
@@ -210,14 +307,9 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
     }
     for (const auto& [name, value] : content.items()) {
       const std::string key = section + "." + name;
-      const Setting* setting = find_setting(key);
-      if (setting == nullptr) {
-        problems.add(
-            invalid(prefix + key, "unknown setting" + did_you_mean(key, settings_table(), &Setting::key)));
-        continue;
-      }
-      const Target member = default_member(*setting);
-      if (const auto text = text_in_file(member.type, value))
+      const auto setting = setting_called(key, &Setting::key, "setting");
+      const Target member = setting ? default_member(**setting) : Target{};
+      if (const auto text = setting ? text_in_file(member.type, value) : std::optional(std::string()))
         problems.add(set(key, *text, Origin::file, prefix + key));
       else
         problems.add(invalid(prefix + key, "must be of type " + kind(member)));
@@ -233,120 +325,13 @@ std::string Settings::print() const {
     const Target member = setting.member(options);
     std::string line = std::string(setting.key) + " = ";
     const bool quoted = member.type == Type::text || member.type == Type::choice;
-    line += quoted
-                ? nlohmann::json(member.text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
-                : member.text;
+    line += quoted ? json_text(nlohmann::json(member.text)) : member.text;
     line.resize(std::max<std::size_t>(line.size() + 2, 60), ' ');
     text += line + "# " + std::string(to_string(origin(setting.key))) +
             (setting.unit.empty() ? "" : std::string(", ").append(setting.unit)) + "\n";
   }
   return text;
 }
-
-namespace {
-
-using Action = Invocation::Action;
-
-constexpr std::array<std::pair<std::string_view, Action>, 10> actions{{
-    {"--help", Action::help},
-    {"--version", Action::version},
-    {"--check-config", Action::check_config},
-    {"--print-config", Action::print_config},
-    {"--print-openapi", Action::print_openapi},
-    {"--print-config-schema", Action::print_config_schema},
-    {"--check-store", Action::check_store},
-    {"--backup", Action::backup},
-    {"--restore", Action::restore},
-    {"--salvage", Action::salvage},
-}};
-
-bool names_a_file(Action action) {
-  return action == Action::backup || action == Action::restore || action == Action::salvage;
-}
-
-// The values of flags and environment before they are in force.
-struct Given {
-  std::optional<Action> action;
-  std::string file;  // of the action
-  std::optional<std::string> config;
-  std::vector<Pending> flags, variables;
-};
-
-Result<const Setting*> setting_of_flag(const std::string& name) {
-  const auto table = settings_table();
-  const auto setting =
-      std::find_if(table.begin(), table.end(), [&](const Setting& each) { return each.flag() == name; });
-  if (setting != table.end()) return &*setting;
-  if (name == "--config") return nullptr;
-  std::vector<std::string> known;
-  for (const Setting& each : table) known.push_back(each.flag());
-  for (const auto& each : actions) known.emplace_back(each.first);
-  known.emplace_back("--config");
-  return invalid(name, "unknown flag" + did_you_mean(name, known));
-}
-
-Result<void> read_flags(const std::vector<std::string>& arguments, Given& given) {
-  for (std::size_t i = 0; i < arguments.size(); ++i) {
-    const std::string& argument = arguments[i];
-    const auto action = std::find_if(actions.begin(), actions.end(),
-                                     [&](const auto& each) { return each.first == argument; });
-    if (action != actions.end()) {
-      if (given.action.value_or(action->second) != action->second)
-        return invalid(argument, "only one such command can be given");
-      given.action = action->second;
-      if (names_a_file(action->second)) {
-        if (i + 1 == arguments.size() || arguments[i + 1].empty()) return invalid(argument, "needs a file");
-        given.file = arguments[++i];
-      }
-      continue;
-    }
-    const auto equals = argument.find('=');
-    const std::string name = argument.substr(0, equals);
-    TRY_ASSIGN(const auto setting, setting_of_flag(name));
-    if (equals == std::string::npos && i + 1 == arguments.size()) return invalid(name, "needs a value");
-    std::string value = equals == std::string::npos ? arguments[++i] : argument.substr(equals + 1);
-    const bool repeated =
-        setting == nullptr
-            ? given.config.has_value()
-            : std::ranges::any_of(given.flags, [&](const Pending& each) { return each.where == name; });
-    if (repeated) return invalid(name, "is given more than once");
-    if (setting == nullptr)
-      given.config = std::move(value);
-    else
-      given.flags.push_back({std::string(setting->key), std::move(value), name});
-  }
-  return {};
-}
-
-constexpr std::string_view of_the_command_line[] = {"JOULECAST_SERVER", "JOULECAST_TOKEN",
-                                                    "JOULECAST_CLIENT_CERTIFICATE", "JOULECAST_CLIENT_KEY"};
-
-void read_environment(const std::vector<std::string>& environment, Given& given, Problems& problems) {
-  const auto table = settings_table();
-  for (const std::string& entry : environment) {
-    if (!entry.starts_with("JOULECAST_")) continue;
-    const auto equals = entry.find('=');
-    const std::string name = entry.substr(0, equals);
-    std::string value = equals == std::string::npos ? "" : entry.substr(equals + 1);
-    if (name == "JOULECAST_CONFIG") {
-      if (!given.config) given.config = std::move(value);
-      continue;
-    }
-    if (std::ranges::find(of_the_command_line, name) != std::end(of_the_command_line)) continue;
-    const auto setting = std::find_if(table.begin(), table.end(),
-                                      [&](const Setting& each) { return each.environment() == name; });
-    if (setting == table.end()) {
-      std::vector<std::string> known;
-      for (const Setting& each : table) known.push_back(each.environment());
-      known.emplace_back("JOULECAST_CONFIG");
-      problems.add(invalid(name, "unknown environment variable" + did_you_mean(name, known)));
-      continue;
-    }
-    given.variables.push_back({std::string(setting->key), std::move(value), name});
-  }
-}
-
-}  // namespace
 
 Result<Invocation> read_settings(const std::vector<std::string>& arguments,
                                  const std::vector<std::string>& environment) {

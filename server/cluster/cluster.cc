@@ -6,7 +6,6 @@
 #include "base/fault_boundary.h"
 #include "base/sleep.h"
 #include "base/try.h"
-#include "ingest/fleet_view.h"
 #include "robot/robot_file.h"
 #include "server/cluster/assignment.h"
 
@@ -199,7 +198,6 @@ ClusterStatus Cluster::status() const {
   now.renewed_s = seconds_since(renewed_);
   now.kept = parts_.keeping.kept().size();
   now.resumed_missions = parts_.keeping.resumed_missions;
-  now.replayed_messages = parts_.keeping.replayed_messages;
   now.dropped_commands = parts_.store.fenced();
   now.held_messages = parts_.keeping.held_messages;
   now.held_bytes = parts_.keeping.held_bytes;
@@ -390,7 +388,6 @@ bool Cluster::keeps(const history::Lease& lease) {
 
 void Cluster::count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken) {
   const std::lock_guard lock(mutex_);
-  status_.taken += taken.size();
   for (const history::Lease& lease : taken) {
     const auto before = std::ranges::find(seen, lease.robot_id, &history::Lease::robot_id);
     if (before != seen.end() && !before->node.empty()) ++status_.takeovers;

@@ -41,10 +41,9 @@ struct ClusterStatus {
   std::size_t kept = 0;                // robots
   std::uint64_t takeovers = 0;         // robots taken from daemons that were gone
   std::uint64_t handovers = 0;         // robots given to daemons that joined or hear them
-  std::uint64_t taken = 0;             // leases taken in all
   std::uint64_t dropped_commands = 0;  // for the robot's lease being another's
   std::uint64_t memberships_lost = 0;  // this daemon was away for longer than its lifetime
-  std::uint64_t resumed_missions = 0, replayed_messages = 0;
+  std::uint64_t resumed_missions = 0;
   std::size_t held_messages = 0, held_bytes = 0;
   std::uint64_t held_dropped = 0;
 };

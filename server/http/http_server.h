@@ -72,16 +72,13 @@ enum class Refusal : std::uint8_t {
 
 std::string_view to_string(Refusal refusal);
 
-// One answered request, for metrics and the access log.
+// One answered request, for metrics.
 struct Exchange {
   std::string_view operation = {};  // operation id, or "unmatched"
-  Method method = Method::get;
   unsigned status = 0;
   double duration_s = 0;  // from the last byte of the request to the last byte of the answer's head and body
   std::uint64_t request_bytes = 0;
   std::uint64_t response_bytes = 0;
-  std::string_view target = {};
-  std::string_view request_id = {};
   bool stream = false;  // the duration is that of a stream, not of an answer
 };
 

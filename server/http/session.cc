@@ -1,6 +1,5 @@
 #include "server/http/session.h"
 
-#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -328,9 +327,9 @@ bool Session::refuse(Refusal refusal, unsigned status, std::string_view slug, st
 
 void Session::observe(bool streamed) {
   core_->observer.exchanged({endpoint_ != nullptr ? std::string_view(endpoint_->operation_id) : "unmatched",
-                             request_.method, response_.status,
+                             response_.status,
                              std::chrono::duration<double>(Clock::now() - received_).count(), request_bytes_,
-                             response_bytes_, request_.target, request_.id, streamed});
+                             response_bytes_, streamed});
 }
 
 // Lets the source wake the session from any thread.

@@ -58,7 +58,7 @@ class Keeping {
   history::Epoch epoch_of(std::string_view robot_id) const;
   std::map<std::string, history::Epoch, std::less<>> kept() const;
 
-  std::atomic<std::uint64_t> resumed_missions = 0, replayed_messages = 0, held_dropped = 0;
+  std::atomic<std::uint64_t> resumed_missions = 0, held_dropped = 0;
   std::atomic<std::size_t> held_messages = 0, held_bytes = 0;
 
  private:

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "base/json_number.h"
 #include "base/try.h"
 
 namespace joulecast::ingest {
@@ -190,7 +191,6 @@ void Pipeline::take_up(const StoredRobot& stored, const Keeping::Grant* grant) {
   if (grant != nullptr) {
     robot.session.take_over(stored, grant->position);
     keeping_->resumed_missions += stored.open ? 1 : 0;
-    keeping_->replayed_messages += held.size();
     robot.session.begin_repeats();
   } else {
     robot.session.resume(stored);
@@ -341,8 +341,7 @@ void report_reused_name(const history::Mission& begun, history::MissionKey earli
                               {"mission_id", begun.mission_id},
                               {"start_utime_us", begun.start_utime_us},
                               {"earlier_mission", earlier}};
-  post(history::AppendEvent{{0, host_utime_us, begun.robot_id, "mission_id_reused",
-                             detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
+  post(history::AppendEvent{{0, host_utime_us, begun.robot_id, "mission_id_reused", json_text(detail)}});
 }
 
 }  // namespace joulecast::ingest
