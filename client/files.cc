@@ -5,8 +5,6 @@
 #include <iostream>
 #include <system_error>
 
-#include "base/text_file.h"
-
 namespace joulecast::client {
 namespace {
 

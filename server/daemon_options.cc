@@ -11,7 +11,7 @@
 #include "ingest/model_loading.h"
 #include "ingest/signature_gate.h"
 #include "server/http/admission.h"
-#include "server/http/cors.h"
+#include "server/http/delivery.h"
 #include "server/http/gate.h"
 #include "telemetry/datagram_socket.h"
 #include "telemetry/lcm_link.h"

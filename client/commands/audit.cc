@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "base/json_number.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "client/commands/option.h"
@@ -31,7 +32,7 @@ void print_entry(const history::AuditEntry& entry) {
       {"action", entry.action},
       {"detail", nlohmann::ordered_json::parse(entry.detail_json, nullptr, false)},
       {"hash", entry.hash}};
-  fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  fmt::print("{}\n", json_text(line));
 }
 
 Result<Exit> list_audit(AuditOptions& options) {

@@ -12,7 +12,6 @@
 #include "client/wrapped.h"
 #include "signals/gaps.h"
 #include "telemetry/impossible.h"
-#include "telemetry/slow_stream.h"
 #include "windows/track.h"
 
 namespace joulecast::client {

@@ -35,7 +35,6 @@
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"
-#include "telemetry/signature.h"
 
 namespace joulecast::client {
 namespace {

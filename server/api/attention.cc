@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/fault_boundary.h"
+#include "base/json_number.h"
 #include "base/sleep.h"
 #include "base/try.h"
 #include "base/utc_time.h"
@@ -42,14 +43,6 @@ constexpr AttentionKind kinds[] = {{"contradicted", "", "contradiction_ended"},
                                    {"proposal"},
                                    {"store"},
                                    {"cluster"}};
-
-std::string_view name_of(Severity severity) {
-  return severity_names[static_cast<std::size_t>(severity)];
-}
-
-std::string text_of(const nlohmann::json& json) {
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
 
 void order(std::vector<AttentionReason>& reasons) {
   std::ranges::stable_sort(reasons, {}, [](const AttentionReason& r) {
@@ -202,7 +195,7 @@ std::string reasons_json(const std::vector<AttentionReason>& reasons) {
     if (reasons[k].since_utime_us) list[k]["since_utime_us"] = *reasons[k].since_utime_us;
     if (reasons[k].acknowledged) list[k]["acknowledged"] = *reasons[k].acknowledged;
   }
-  return text_of({{"reasons", std::move(list)}});
+  return json_text(nlohmann::json{{"reasons", std::move(list)}});
 }
 
 // Throws nlohmann::json::exception for another form.
@@ -227,9 +220,7 @@ const Table<AttentionEntry>& attention_entry_table() {
   static const auto reason =
       Table<AttentionReason>()
           .word("kind", &AttentionReason::kind, attention_kinds(), "the condition")
-          .word(
-              "severity", [](const AttentionReason& r) { return name_of(r.severity); }, severity_names,
-              "as above")
+          .word("severity", &AttentionReason::severity, severity_names, "as above")
           .time("since", &AttentionReason::since_utime_us,
                 "start of the condition, microseconds since 1970; null: not available")
           .value("message", &AttentionReason::message, "the condition in one sentence, with its number")
@@ -241,12 +232,11 @@ const Table<AttentionEntry>& attention_entry_table() {
           .named("attention-entry")
           .text_or_null("robot_id", &E::robot_id, "the robot; null: the service itself")
           .word(
-              "severity", [](const E& e) { return name_of(e.reasons.front().severity); }, severity_names,
+              "severity", AT(reasons.front().severity), severity_names,
               "severity of its first reason. fault: data are wrong or missing; warning: a robot or its model "
               "needs a person; notice: for information")
-          .value(
-              "acknowledged", [](const E& e) { return e.reasons.front().acknowledged.has_value(); },
-              "whether all its reasons are acknowledged")
+          .value("acknowledged", AT(reasons.front().acknowledged.has_value()),
+                 "whether all its reasons are acknowledged")
           .list("reasons", &E::reasons, "the unacknowledged ones first, then the most urgent", reason,
                 {{"minItems", 1}});
   return table;
@@ -309,10 +299,9 @@ Result<Response> acknowledge(const Services& services, const Request& request) {
   const history::Outcome done = services.attention->acknowledge(
       robot_id, std::string(kinds[wanted.kind].name), {services.now_utime_us(), request.actor, wanted.note},
       [&](const AttentionEntry& entry, history::Learned learned) {
-        history::Change change = request_change.answered_by(
-            [entry](std::int64_t) { return http::json_response(attention_entry_table().text(entry)); });
-        change.command = history::PutLearned{std::move(learned)};
-        return services.writer.execute(std::move(change));
+        return services.writer.execute(request_change.answered_by(
+            [entry](std::int64_t) { return http::json_response(attention_entry_table().text(entry)); },
+            history::PutLearned{std::move(learned)}));
       });
   return request_change.result(done);
 }
@@ -400,8 +389,8 @@ void AttentionList::record(const std::string& robot_id, const AttentionReason& r
   if (event.empty()) return;
   nlohmann::json detail{{"message", reason.message}};
   if (reason.since_utime_us) detail["since_utime_us"] = *reason.since_utime_us;
-  if (const auto posted = services_.writer.offer(
-          history::AppendEvent{{0, services_.now_utime_us(), robot_id, std::string(event), text_of(detail)}});
+  if (const auto posted = services_.writer.offer(history::AppendEvent{
+          {0, services_.now_utime_us(), robot_id, std::string(event), json_text(detail)}});
       !posted)
     on_error_(posted.error());
 }

@@ -37,13 +37,26 @@ Response repeated(history::RequestAnswer&& answer) {
   return response;
 }
 
+history::RequestAnswer answer_under(history::RequestAnswer key, const Response& response) {
+  key.status = response.status;
+  key.location = response.header("Location");
+  key.body = response.body;
+  return key;
+}
+
+// Without a time.
+history::RequestAnswer key_of(const Request& request) {
+  return {request.actor, request.kept.idempotency_key, request.kept.fingerprint, 0, 0, "", ""};
+}
+
 }  // namespace
 
-history::Change RequestChange::answered_by(Answer answer) {
+history::Change RequestChange::answered_by(Answer answer, std::optional<history::Command> command) {
   response_ = std::make_shared<std::optional<Response>>();
   const std::int64_t now = services_.now_utime_us();
   const http::Kept& kept = request_.kept;
   history::Change change;
+  change.command = std::move(command);
   if (!kept.idempotency_key.empty()) {
     change.key = key_of(request_);
     change.key->utime_us = now;
@@ -64,10 +77,8 @@ history::Change RequestChange::answered_by(Answer answer) {
 }
 
 Result<Response> RequestChange::execute(history::Command command, std::string text) {
-  history::Change change =
-      answered_by([text = std::move(text)](std::int64_t) { return http::json_response(text); });
-  change.command = std::move(command);
-  return result(services_.writer.execute(std::move(change)));
+  return result(services_.writer.execute(answered_by(
+      [text = std::move(text)](std::int64_t) { return http::json_response(text); }, std::move(command))));
 }
 
 Result<Response> RequestChange::finish(Result<void> committed) {
@@ -78,17 +89,6 @@ Result<Response> RequestChange::finish(Result<void> committed) {
   }
   request_.kept.committed = true;
   return std::move(**response_);
-}
-
-history::RequestAnswer key_of(const Request& request) {
-  return {request.actor, request.kept.idempotency_key, request.kept.fingerprint, 0, 0, "", ""};
-}
-
-history::RequestAnswer answer_under(history::RequestAnswer key, const Response& response) {
-  key.status = response.status;
-  key.location = response.header("Location");
-  key.body = response.body;
-  return key;
 }
 
 http::Endpoint IdempotencyKeys::honoured(http::Endpoint endpoint) const {

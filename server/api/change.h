@@ -24,8 +24,8 @@ class RequestChange {
 
   RequestChange(const Services& services, const Request& request) : services_(services), request_(request) {}
 
-  // The transaction's records of the request, to which a command is added.
-  history::Change answered_by(Answer answer);
+  // The transaction: the command and the records of the request.
+  history::Change answered_by(Answer answer, std::optional<history::Command> command = {});
 
   // Executes the command in a transaction that is answered with the JSON text.
   Result<Response> execute(history::Command command, std::string text);
@@ -43,10 +43,6 @@ class RequestChange {
   const Request& request_;
   std::shared_ptr<std::optional<Response>> response_;  // made within the transaction
 };
-
-// The key of a request, and the answer under it; without a time.
-history::RequestAnswer key_of(const Request& request);
-history::RequestAnswer answer_under(history::RequestAnswer key, const Response& response);
 
 // Answers a repeated request as it was answered the first time, and does nothing.
 class IdempotencyKeys {

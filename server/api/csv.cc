@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/resolution.h"
+#include "base/json_writer.h"
 #include "base/text.h"
 #include "server/http/text.h"
 
@@ -85,12 +85,13 @@ void Csv::end_row() {
 }
 
 void Csv::row(const std::string& item) {
-  const auto members = nlohmann::json::parse(item);
+  const auto members = nlohmann::ordered_json::parse(item);
   for (const std::string& column : columns_) {
     const bool asked = column.ends_with('?');
     const std::string path =
         column.substr(column.find('=') + 1).substr(0, asked ? column.size() - 1 : column.npos);
-    const auto value = members.value(nlohmann::json::json_pointer("/" + path), nlohmann::json());
+    const auto value =
+        members.value(nlohmann::ordered_json::json_pointer("/" + path), nlohmann::ordered_json());
     if (asked)
       field(!value.is_null());
     else if (value.is_boolean())
@@ -101,6 +102,8 @@ void Csv::row(const std::string& item) {
       field(value.get<double>());
     else if (value.is_array())
       field(fmt::format("{}", fmt::join(value.get<std::vector<std::string>>(), " ")));
+    else if (value.is_object())
+      field(value.dump());
     else
       field(value.is_null() ? "" : value.get<std::string>());
   }

@@ -20,12 +20,13 @@ class Csv {
   Csv& field(std::string_view text);
   Csv& field(const std::string& text) { return field(std::string_view(text)); }
   Csv& field(const char* text) { return field(std::string_view(text)); }
-  Csv& field(double number);  // resolved() (base/resolution.h) and rounded
+  Csv& field(double number);  // resolved() (base/json_writer.h) and rounded
   Csv& exact(double number);  // all digits, for raw data
   Csv& field(std::int64_t number);
   Csv& field(bool truth);
   void end_row();
-  // A row of an item's JSON. Null is an empty field, texts of an array are separated by blanks.
+  // A row of an item's JSON. Null is an empty field, texts of an array are separated by blanks, an object is
+  // JSON.
   void row(const std::string& item);
 
   // `name` is the file's name without its extension.

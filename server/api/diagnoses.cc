@@ -38,13 +38,10 @@ const Table<DiagnosisAnswer>& job_table() {
       Table<A>()
           .value("id", AT(record.id), "number of the diagnosis, as in /v1/diagnoses/{id}")
           .value("robot_id", AT(record.robot_id), "the robot that is diagnosed")
-          .word(
-              "state", [](const A& a) { return history::name(state_of(a)); },
-              history::names_of<history::DiagnosisState>, "interrupted: the service stopped while it ran")
-          .word(
-              "cause", [](const A& a) { return history::name(a.record.cause); },
-              history::names_of<history::DiagnosisCause>,
-              "request: started by a client; watch: started after a detected drift")
+          .word("state", state_of, history::names_of<history::DiagnosisState>,
+                "interrupted: the service stopped while it ran")
+          .word("cause", AT(record.cause), history::names_of<history::DiagnosisCause>,
+                "request: started by a client; watch: started after a detected drift")
           .value("progress", done_share, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
           .value(
               "ahead", [](const A& a) { return a.progress ? a.progress->ahead : a.ahead; },
@@ -172,8 +169,7 @@ const Table<server::DiagnosisProgress>& progress_table() {
   static const auto table =
       Table<P>("Progress of a diagnosis")
           .value("id", &P::id, "number of the diagnosis")
-          .word(
-              "state", [](const P& p) { return history::name(p.state); }, states, "queued or running")
+          .word("state", &P::state, states, "queued or running")
           .value("progress", &P::fraction, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
           .value("ahead", &P::ahead, "diagnoses that run before it", {{"minimum", 0}});
   return table;

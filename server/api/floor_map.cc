@@ -128,9 +128,8 @@ const Table<FloorAnswer>& floor_map_table() {
                 "groups of adjacent squares with a departure of the same sign, in descending order of excess "
                 "energy",
                 zone)
-          .value(
-              "cells_total", [](const A& a) { return a.map.cells.size(); },
-              "number of squares, of which at most limit are listed", at_least_0)
+          .value("cells_total", AT(map.cells.size()), "number of squares, of which at most limit are listed",
+                 at_least_0)
           .list("cells", squares_of, "the longest visited first", square_table());
   return table;
 }

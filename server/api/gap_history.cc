@@ -4,9 +4,7 @@
 #include "answers/mission.h"
 #include "base/json_writer.h"
 #include "base/try.h"
-#include "base/utc_time.h"
 #include "server/api/common_parameters.h"
-#include "server/api/csv.h"
 #include "server/api/services.h"
 
 // The gap of a robot by mission, the models adopted over that time, and the gap of robots of its kind.
@@ -121,16 +119,6 @@ Result<Response> gap_history(const Services& services, const Request& request) {
       {id, model->version, std::move(missions), std::move(marks), std::move(versions), std::move(siblings)}));
 }
 
-Response event_csv(const Request& request, const std::vector<history::Event>& events,
-                   std::string_view next_cursor) {
-  Csv csv(request, {"id", "time", "utime_us", "robot_id", "kind", "detail"});
-  for (const history::Event& e : events) {
-    csv.field(e.id).field(utc_text(e.utime_us)).field(e.utime_us).field(e.robot_id).field(e.kind);
-    csv.field(e.detail_json).end_row();
-  }
-  return csv.response("event-log", request, next_cursor);
-}
-
 const Table<history::Event>& event_table() {
   using E = history::Event;
   static const auto table =
@@ -149,7 +137,9 @@ Result<Response> list_events(const Services& services, const Request& request) {
   TRY_ASSIGN(const LogQuery query, log_query(request, usual_event_order));
   TRY_ASSIGN(const auto found, services.store.events(query.behind_id, query.limit, query.filter));
   const std::string next = next_id_cursor(found, query.limit, &history::Event::id);
-  if (request.csv) return event_csv(request, found, next);
+  if (request.csv)
+    return csv_response(request, "event-log", {"id", "time", "utime_us", "robot_id", "kind", "detail"}, found,
+                        event_table(), next);
   return page_response("events", found, event_table(), next);
 }
 

@@ -48,12 +48,9 @@ const Table<Place>& place_table() {
 }
 
 const Table<FloorPlan>& plan_table() {
-  static const auto charger =
-      Table<std::array<double, 2>>()
-          .value(
-              "x_m", [](const std::array<double, 2>& at) { return at[0]; }, "place in the map")
-          .value(
-              "y_m", [](const std::array<double, 2>& at) { return at[1]; }, "place in the map");
+  static const auto charger = Table<std::array<double, 2>>()
+                                  .value("x_m", AT(at(0)), "place in the map")
+                                  .value("y_m", AT(at(1)), "place in the map");
   static const auto table =
       Table<FloorPlan>("Plan of one level of a map")
           .value("map", &FloorPlan::map, "name of the map")

@@ -123,17 +123,16 @@ Result<Response> request_mission(Services& services, const Request& request) {
   const MissionRequest accepted{event, std::max(host_us, before_us + 1)};
   requests.push_back(accepted);
 
-  RequestChange request_change(services, request);
-  history::Change change = request_change.answered_by([id, event](std::int64_t) {
+  const auto answer = [id, event](std::int64_t) {
     Response response = http::json_response(requested_table().text({id, event}));
     response.status = 202;
     return response;
-  });
-  change.command = history::PutLearned{{id, std::string(ingest::mission_request_topic),
-                                        accepted.request_utime_us, ingest::mission_requests_json(requests)},
-                                       0,
-                                       before_us};
-  const history::Outcome done = services.writer.execute(std::move(change));
+  };
+  const history::Learned all{id, std::string(ingest::mission_request_topic), accepted.request_utime_us,
+                             ingest::mission_requests_json(requests)};
+  RequestChange request_change(services, request);
+  const history::Outcome done =
+      services.writer.execute(request_change.answered_by(answer, history::PutLearned{all, 0, before_us}));
   if (done) services.request_mission(id, accepted);
   return request_change.result(done);
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "answers/mission.h"
+#include "base/json_number.h"
 #include "base/try.h"
 #include "describe/input.h"
 #include "server/api/change.h"
@@ -109,15 +110,14 @@ Result<Response> annul(Services& services, const Request& request) {
   const nlohmann::json detail{
       {"mission", mission.key}, {"mission_id", mission.mission_id}, {"reason", reason}};
   std::vector<history::Command> commands{
-      history::AppendEvent{{0, now, mission.robot_id, "mission_annulled",
-                            detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}}};
+      history::AppendEvent{{0, now, mission.robot_id, "mission_annulled", json_text(detail)}}};
   const auto model = services.models.find(mission.robot_id);
   if (auto learned = model ? services.forecasts.forget(model, mission.start_utime_us) : std::nullopt)
     commands.emplace_back(history::PutLearned{std::move(*learned)});
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by(
-      [mission](std::int64_t) { return http::json_response(answers::mission_table().text(mission)); });
-  change.command = history::CheckpointMission{mission, {}, {}, std::nullopt};
+      [mission](std::int64_t) { return http::json_response(answers::mission_table().text(mission)); },
+      history::CheckpointMission{mission, {}, {}, std::nullopt});
   change.add_before([commands = std::move(commands)](std::int64_t) { return commands; });
   const history::Outcome done = services.writer.execute(std::move(change));
   if (!done && model) services.forecasts.learnt_elsewhere(mission.robot_id);  // as it is stored

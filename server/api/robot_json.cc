@@ -14,52 +14,6 @@ using ingest::RobotSnapshot;
 
 constexpr double live_s = 5;
 
-}  // namespace
-
-double silence_s(const ingest::RobotSnapshot& s, std::int64_t now_utime_us) {
-  return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
-                                 : signals::unmeasured;
-}
-
-const Table<ingest::Contradiction>& contradiction_table() {
-  using C = ingest::Contradiction;
-  static const auto table =
-      Table<C>({}, "a contradiction in a robot's telemetry")
-          .named("contradiction")
-          .word(
-              "kind",
-              [](const C& c) { return ingest::contradiction_kind_names[static_cast<std::size_t>(c.kind)]; },
-              ingest::contradiction_kind_names, "likely kind of integration error")
-          .value("id", &C::id, "identifier, such as battery_current_reversed")
-          .value("channel", &C::channel,
-                 "fields of robot_telemetry_t, separated by a comma; empty: no single one")
-          .number_or_null(
-              "value", &C::value,
-              "value of the contradiction: a factor of the channel, its value, or a share of the messages")
-          .value("says", &C::says,
-                 "the finding, the quantity it contradicts, its likely cause and the expected input")
-          .value("untrue", &C::untrue, "whether affected missions are excluded from training")
-          .time("told", &C::told_utime_us,
-                "time of its last report, in the log and the event log at most once per hour; microseconds "
-                "since 1970 by the host's clock");
-  return table;
-}
-
-const Table<ContradictionEvent>& contradiction_event_table() {
-  using E = ContradictionEvent;
-  static const auto table =
-      Table<E>("Contradiction in the telemetry of a robot")
-          .value("robot_id", AT(robot_id), "robot of the event")
-          .object("contradiction", AT(contradiction), "as in the robot's state", contradiction_table());
-  return table;
-}
-
-bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
-  return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
-}
-
-namespace {
-
 const Table<ingest::ChargeView>& charge_table() {
   using V = ingest::ChargeView;
   using battery::ChargeSource;
@@ -69,9 +23,8 @@ const Table<ingest::ChargeView>& charge_table() {
                                   battery::name(ChargeSource::current), battery::name(ChargeSource::model)};
   static const auto table =
       Table<V>()
-          .word(
-              "source", [](const V& v) { return battery::name(v.estimate.source); }, sources,
-              "present source of the charge estimate; model: modelled power replaces the measured current")
+          .word("source", AT(estimate.source), sources,
+                "present source of the charge estimate; model: modelled power replaces the measured current")
           .value("default_curve", AT(estimate.default_curve),
                  "true: the robot file has no open-circuit voltage, and a typical curve is used")
           .value(
@@ -106,6 +59,45 @@ const answers::Quantiles& quantiles_of(const LiveState& state, answers::Quantile
 }
 
 }  // namespace
+
+double silence_s(const ingest::RobotSnapshot& s, std::int64_t now_utime_us) {
+  return s.received_utime_us > 0 ? static_cast<double>(now_utime_us - s.received_utime_us) * 1e-6
+                                 : signals::unmeasured;
+}
+
+const Table<ingest::Contradiction>& contradiction_table() {
+  using C = ingest::Contradiction;
+  static const auto table =
+      Table<C>({}, "a contradiction in a robot's telemetry")
+          .named("contradiction")
+          .word("kind", &C::kind, ingest::contradiction_kind_names, "likely kind of integration error")
+          .value("id", &C::id, "identifier, such as battery_current_reversed")
+          .value("channel", &C::channel,
+                 "fields of robot_telemetry_t, separated by a comma; empty: no single one")
+          .number_or_null(
+              "value", &C::value,
+              "value of the contradiction: a factor of the channel, its value, or a share of the messages")
+          .value("says", &C::says,
+                 "the finding, the quantity it contradicts, its likely cause and the expected input")
+          .value("untrue", &C::untrue, "whether affected missions are excluded from training")
+          .time("told", &C::told_utime_us,
+                "time of its last report, in the log and the event log at most once per hour; microseconds "
+                "since 1970 by the host's clock");
+  return table;
+}
+
+const Table<ContradictionEvent>& contradiction_event_table() {
+  using E = ContradictionEvent;
+  static const auto table =
+      Table<E>("Contradiction in the telemetry of a robot")
+          .value("robot_id", AT(robot_id), "robot of the event")
+          .object("contradiction", AT(contradiction), "as in the robot's state", contradiction_table());
+  return table;
+}
+
+bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
+  return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
+}
 
 const Table<LiveState>& state_table() {
   using L = LiveState;

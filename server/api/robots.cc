@@ -243,10 +243,11 @@ Result<Response> remove(Services& services, const Request& request) {
                 "robot " + id + " has no model in force; history=purge deletes its stored data");
   services.models.remove(id);
   RequestChange request_change(services, request);
-  history::Change change = request_change.answered_by([id, history](std::int64_t missions) {
-    return http::json_response(removal_table().text({id, history, missions}));
-  });
-  change.command = history::RemoveRobot{id, history == "purge"};
+  history::Change change = request_change.answered_by(
+      [id, history](std::int64_t missions) {
+        return http::json_response(removal_table().text({id, history, missions}));
+      },
+      history::RemoveRobot{id, history == "purge"});
   change.add_before([id, history, now = services.now_utime_us()](std::int64_t missions) {
     JsonWriter detail;
     detail.begin_object().field("history", history).field("missions_deleted", missions).end_object();

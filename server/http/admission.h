@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "server/http/cors.h"
+#include "server/http/delivery.h"
 #include "server/http/http_server.h"
 
 namespace joulecast::http {

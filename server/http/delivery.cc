@@ -4,16 +4,24 @@
 #include <zlib.h>
 #include <zstd.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/core/noncopyable.hpp>
-#include <utility>
 
 #include "server/http/text.h"
 
 namespace joulecast::http {
 namespace {
 
+// Weak: it holds for every content coding. "W/\"<hash>\"".
+std::string entity_tag(std::string_view bytes) {
+  return fmt::format("W/\"{:x}\"", fnv1a(bytes));
+}
+
 constexpr std::size_t least_coded_bytes = 1024;
+
+// How long a browser may cache the answer to a preflight request.
+constexpr const char* preflight_age_s = "600";
 
 bool is_json(const Response& response) {
   return response.content_type.starts_with("application/json");
@@ -52,53 +60,6 @@ void code(const Request& request, Response& response) {
   }
   response.headers.emplace_back("Content-Encoding", name(coding));
 }
-
-}  // namespace
-
-std::string entity_tag(std::string_view bytes) {
-  return fmt::format("W/\"{:x}\"", fnv1a(bytes));
-}
-
-void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io) {
-  if (response.status != endpoint.success_status || !response.header("Content-Encoding").empty()) return;
-  std::string vary = endpoint.csv ? "Accept" : "";
-  if (endpoint.rounded && is_json(response) && !response.stream) round(request, response);
-  const bool known = endpoint.etag && !response.stream && tag(request, response);
-  const bool large = response.stream || body_of(response).size() >= least_coded_bytes;
-  if (!on_io && endpoint.response_type != "text/event-stream" && large) {
-    vary += vary.empty() ? "Accept-Encoding" : ", Accept-Encoding";
-    if (!known) code(request, response);
-  }
-  if (!vary.empty()) response.headers.emplace_back("Vary", std::move(vary));
-}
-
-Asset::Asset(std::string bytes, std::string content_type, std::string cache_control)
-    : content_type_(std::move(content_type)), cache_control_(std::move(cache_control)) {
-  plain_tag_ = entity_tag(bytes).substr(2);  // one form, one tag: strong
-  gzipped_tag_ = plain_tag_;
-  gzipped_tag_.insert(gzipped_tag_.size() - 1, "-gzip");
-  std::string small = gzip_smallest(bytes);
-  if (!small.empty() && small.size() < bytes.size())
-    gzipped_ = std::make_shared<const std::string>(std::move(small));
-  plain_ = std::make_shared<const std::string>(std::move(bytes));
-}
-
-Response Asset::answer(const Request& request) const {
-  const bool compressed = gzipped_ && lists(request.header("accept-encoding"), "gzip");
-  const std::string& tag = compressed ? gzipped_tag_ : plain_tag_;
-  Response response;
-  response.content_type = content_type_;
-  response.headers = {{"ETag", tag}, {"Cache-Control", cache_control_}, {"Vary", "Accept-Encoding"}};
-  if (lists(request.header("if-none-match"), tag)) {
-    response.status = 304;
-    return response;
-  }
-  if (compressed) response.headers.emplace_back("Content-Encoding", "gzip");
-  response.shared_body = compressed ? gzipped_ : plain_;
-  return response;
-}
-
-namespace {
 
 // Answers are coded on demand: speed counts more than the last tenth of size.
 constexpr int gzip_level = 4;
@@ -205,7 +166,52 @@ class CodedStream final : public StreamSource {
   std::string piece_;
 };
 
+// gzip (RFC 1952) at its smallest, for bodies that are coded once and sent often.
+std::string gzip_smallest(std::string_view bytes) {
+  GzipCoder coder(Z_BEST_COMPRESSION);
+  return all_of(coder, bytes);
+}
+
 }  // namespace
+
+void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io) {
+  if (response.status != endpoint.success_status || !response.header("Content-Encoding").empty()) return;
+  std::string vary = endpoint.csv ? "Accept" : "";
+  if (endpoint.rounded && is_json(response) && !response.stream) round(request, response);
+  const bool known = endpoint.etag && !response.stream && tag(request, response);
+  const bool large = response.stream || body_of(response).size() >= least_coded_bytes;
+  if (!on_io && endpoint.response_type != "text/event-stream" && large) {
+    vary += vary.empty() ? "Accept-Encoding" : ", Accept-Encoding";
+    if (!known) code(request, response);
+  }
+  if (!vary.empty()) response.headers.emplace_back("Vary", std::move(vary));
+}
+
+Asset::Asset(std::string bytes, std::string content_type, std::string cache_control)
+    : content_type_(std::move(content_type)), cache_control_(std::move(cache_control)) {
+  plain_tag_ = entity_tag(bytes).substr(2);  // one form, one tag: strong
+  gzipped_tag_ = plain_tag_;
+  gzipped_tag_.insert(gzipped_tag_.size() - 1, "-gzip");
+  std::string small = gzip_smallest(bytes);
+  if (!small.empty() && small.size() < bytes.size())
+    gzipped_ = std::make_shared<const std::string>(std::move(small));
+  plain_ = std::make_shared<const std::string>(std::move(bytes));
+}
+
+Response Asset::answer(const Request& request) const {
+  const bool compressed = gzipped_ && lists(request.header("accept-encoding"), "gzip");
+  const std::string& tag = compressed ? gzipped_tag_ : plain_tag_;
+  Response response;
+  response.content_type = content_type_;
+  response.headers = {{"ETag", tag}, {"Cache-Control", cache_control_}, {"Vary", "Accept-Encoding"}};
+  if (lists(request.header("if-none-match"), tag)) {
+    response.status = 304;
+    return response;
+  }
+  if (compressed) response.headers.emplace_back("Content-Encoding", "gzip");
+  response.shared_body = compressed ? gzipped_ : plain_;
+  return response;
+}
 
 std::string_view name(Coding coding) {
   return coding == Coding::gzip ? "gzip" : coding == Coding::zstd ? "zstd" : "identity";
@@ -221,13 +227,46 @@ std::string coded(Coding coding, std::string_view bytes) {
   return all_of(*coder_of(coding), bytes);
 }
 
-std::string gzip_smallest(std::string_view bytes) {
-  GzipCoder coder(Z_BEST_COMPRESSION);
-  return all_of(coder, bytes);
-}
-
 std::shared_ptr<StreamSource> coded(Coding coding, std::shared_ptr<StreamSource> inner) {
   return std::make_shared<CodedStream>(coding, std::move(inner));
+}
+
+bool Cors::allows(std::string_view origin) const {
+  return std::ranges::find(origins_, origin) != origins_.end();
+}
+
+void Cors::add_headers(const Request& request, Response& response) const {
+  if (origins_.empty()) return;
+  response.headers.emplace_back("Vary", "Origin");
+  const std::string origin(request.header("origin"));
+  if (!allows(origin)) return;
+  response.headers.emplace_back("Access-Control-Allow-Origin", origin);
+  if (request.method == Method::options && !request.header("access-control-request-method").empty()) {
+    const std::string methods(response.header("Allow"));
+    response.headers.emplace_back("Access-Control-Allow-Methods", methods);
+    response.headers.emplace_back(
+        "Access-Control-Allow-Headers",
+        "Accept, Authorization, Cache-Control, Content-Type, Idempotency-Key, If-None-Match, Last-Event-ID, "
+        "X-Request-Id");
+    response.headers.emplace_back("Access-Control-Max-Age", preflight_age_s);
+  } else {
+    response.headers.emplace_back("Access-Control-Expose-Headers",
+                                  "Deprecation, ETag, Idempotency-Replayed, Link, Location, Retry-After, "
+                                  "WWW-Authenticate, X-Request-Id");
+  }
+}
+
+Result<void> check_origin(std::string_view origin) {
+  const auto scheme = origin.find("://");
+  const std::string_view kind = origin.substr(0, std::min(scheme, origin.size()));
+  const std::string_view host = scheme == std::string_view::npos ? "" : origin.substr(scheme + 3);
+  const bool plain =
+      host.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789.-:[]") == std::string_view::npos;
+  if ((kind == "http" || kind == "https") && !host.empty() && plain) return {};
+  return invalid("http.allowed_origins",
+                 "has " + std::string(origin) +
+                     ", must be origins such as https://fleet.example or http://10.0.0.7:3000, in lower case "
+                     "and without a path");
 }
 
 }  // namespace joulecast::http

@@ -3,7 +3,10 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
+#include "base/error.h"
 #include "server/http/message.h"
 #include "server/http/router.h"
 
@@ -15,8 +18,23 @@ namespace joulecast::http {
 // all others.
 void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io);
 
-// Weak: it holds for every content coding. "W/\"<hash>\"".
-std::string entity_tag(std::string_view bytes);
+// Pages of other origins that browsers let use the service (Fetch standard, CORS). They authenticate by a
+// token: cookies are not sent there, since a session's is SameSite=Strict.
+class Cors {
+ public:
+  explicit Cors(std::vector<std::string> allowed_origins) : origins_(std::move(allowed_origins)) {}
+
+  bool allows(std::string_view origin) const;
+
+  // Adds the headers that the browser requires in an answer, and in the answer to a preflight request.
+  void add_headers(const Request& request, Response& response) const;
+
+ private:
+  std::vector<std::string> origins_;
+};
+
+// Fault::invalid for a text that is no origin, "https://name" or "http://name:port", in lower case.
+Result<void> check_origin(std::string_view origin);
 
 // A document that is fixed while the service runs, kept plain and, where that is smaller, gzipped.
 class Asset {
@@ -43,9 +61,6 @@ Coding coding_of(std::string_view accept_encoding);
 
 // The coded form; empty when the library fails, which it does for want of memory alone.
 std::string coded(Coding coding, std::string_view bytes);
-
-// gzip (RFC 1952) at its smallest, for bodies that are coded once and sent often.
-std::string gzip_smallest(std::string_view bytes);
 
 // A stream with coded pieces; the inner stream's output before it waits is flushed.
 std::shared_ptr<StreamSource> coded(Coding coding, std::shared_ptr<StreamSource> inner);

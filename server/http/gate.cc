@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "access/sha256.h"
+#include "base/json_number.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "describe/input.h"
@@ -110,11 +111,6 @@ Response unauthorized(const Request& request, bool presented, std::string_view d
   return response;
 }
 
-std::string text_of(const ordered_json& detail) {
-  // A path contains invalid UTF-8 only through a bug; the audit must not fail on it.
-  return detail.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Gate>> Gate::open(Options options) {
@@ -179,7 +175,8 @@ void Gate::begin_minute() {
   const std::int64_t minute = options_.now_utime_us() / (60 * microseconds_per_s);
   if (minute == minute_) return;
   if (refusals_omitted_ > 0)
-    record({.action = "refusals_omitted", .detail_json = text_of({{"count", refusals_omitted_}})});
+    record(
+        {.action = "refusals_omitted", .detail_json = json_text(ordered_json{{"count", refusals_omitted_}})});
   minute_ = minute;
   refusals_ = refusals_omitted_ = 0;
   refusals_of_.clear();
@@ -198,7 +195,7 @@ void Gate::record_refusal(const Endpoint& endpoint, const Request& request, unsi
   ++refusals_of_[request.address];
   ordered_json detail = wanted(request);
   detail["status"] = status;
-  record({request.actor, request.address, request.id, endpoint.operation_id, text_of(detail)});
+  record({request.actor, request.address, request.id, endpoint.operation_id, json_text(detail)});
 }
 
 // The token that a request proves to have; null: none that is valid. With the mutex held.
@@ -273,7 +270,7 @@ Endpoint Gate::audited(Endpoint endpoint) {
   endpoint.handler = [this, inner = std::move(endpoint.handler),
                       action = endpoint.operation_id](const Request& request) -> Result<Response> {
     const auto event = [&](const ordered_json& detail) {
-      return AccessEvent{request.actor, request.address, request.id, action, text_of(detail)};
+      return AccessEvent{request.actor, request.address, request.id, action, json_text(detail)};
     };
     ordered_json asked = wanted(request);
     if (!request.body.empty()) asked["body_sha256"] = access::sha256_hex(request.body);
@@ -295,7 +292,7 @@ Endpoint Gate::audited(Endpoint endpoint) {
 }
 
 std::string audited_status(unsigned status) {
-  return text_of({{"status", status}});
+  return json_text(ordered_json{{"status", status}});
 }
 
 std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool secure) {
@@ -334,7 +331,8 @@ Result<Response> Gate::sign_in(const Request& request) {
   }
   const std::string value = access::random_hex(32);
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
-  record({token->name, request.address, request.id, here.operation_id, text_of({{"status", 200}})});
+  record({token->name, request.address, request.id, here.operation_id,
+          json_text(ordered_json{{"status", 200}})});
   Response response = json_response(token_table().text(*token));
   response.headers.emplace_back("Set-Cookie", cookie(value, session_s, request.secure));
   return response;
@@ -347,7 +345,8 @@ Result<Response> Gate::sign_out(const Request& request) {
     const Token* token = token_of(request, presented);
     const std::string value = access::sha256_hex(cookie_value(request.header("cookie"), session_cookie));
     if (sessions_.erase(value) > 0 && token != nullptr)
-      record({token->name, request.address, request.id, "deleteSession", text_of({{"status", 204}})});
+      record({token->name, request.address, request.id, "deleteSession",
+              json_text(ordered_json{{"status", 204}})});
   }
   Response response;
   response.status = 204;

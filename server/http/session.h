@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "server/http/admission.h"
-#include "server/http/cors.h"
+#include "server/http/delivery.h"
 #include "server/http/http_server.h"
 
 namespace boost::asio::ssl {

@@ -1,7 +1,5 @@
 #include "server/http/text.h"
 
-#include <algorithm>
-
 namespace joulecast::http {
 namespace {
 

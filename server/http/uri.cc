@@ -4,7 +4,7 @@
 #include <charconv>
 #include <cstddef>
 
-#include "base/utf8.h"
+#include "base/text.h"
 #include "server/http/text.h"
 
 namespace joulecast::http {
@@ -12,8 +12,8 @@ namespace {
 
 constexpr const char* unreadable = "malformed percent-encoding or text that is not printable UTF-8";
 
-}  // namespace
-
+// Decodes %XX; with `plus_is_space` also '+'. Fails on truncated or non-hexadecimal escapes, on NUL and
+// control characters and on text that is not UTF-8.
 std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space) {
   std::string decoded;
   decoded.reserve(text.size());
@@ -35,6 +35,8 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
   if (!is_utf8(decoded)) return std::nullopt;
   return decoded;
 }
+
+}  // namespace
 
 Result<Target> parse_target(std::string_view target) {
   for (const std::string_view scheme : {"http://", "https://"}) {

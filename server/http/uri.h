@@ -10,10 +10,6 @@
 
 namespace joulecast::http {
 
-// Decodes %XX; with `plus_is_space` also '+'. Fails on truncated or non-hexadecimal escapes, on NUL and
-// control characters and on text that is not UTF-8.
-std::optional<std::string> percent_decode(std::string_view text, bool plus_is_space);
-
 struct Target {
   std::vector<std::string> segments;  // of the path, decoded one by one: "%2F" stays inside its segment
   std::vector<std::pair<std::string, std::string>> query;

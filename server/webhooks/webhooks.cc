@@ -1,5 +1,7 @@
 #include "server/webhooks/webhooks.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
@@ -27,12 +29,6 @@ using Json = nlohmann::json;
 constexpr std::size_t longest_text = 2048;
 constexpr std::size_t shortest_secret = 16;
 
-std::string all_kinds() {
-  std::string text;
-  for (const std::string& kind : event_kinds()) text += (text.empty() ? "" : ", ") + kind;
-  return text;
-}
-
 void read_events(Fields& fields, std::set<std::string>& events) {
   const Json* list = fields.member("events");
   if (list == nullptr) {
@@ -42,7 +38,8 @@ void read_events(Fields& fields, std::set<std::string>& events) {
   if (!list->is_array() || list->empty()) return fields.fault("events", "must be an array of kinds");
   for (const Json& kind : *list) {
     if (!kind.is_string() || !event_kinds().contains(kind.get<std::string>()))
-      return fields.fault("events", "has " + kind.dump() + "; the kinds are " + all_kinds());
+      return fields.fault(
+          "events", fmt::format("has {}; the kinds are {}", kind.dump(), fmt::join(event_kinds(), ", ")));
     events.insert(kind.get<std::string>());
   }
 }

@@ -158,119 +158,6 @@ std::optional<forecast::Limitation> limitation_of(const AutonomyInput& input, co
   return limitation;
 }
 
-}  // namespace
-
-Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
-  planning::Pose pose = input.start_pose.value_or(now.pose.value_or(planning::Pose{}));
-  double payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
-  TaskPlan plan;
-  std::size_t knots = 0;
-  plan.from_here = to_charger(input.charger, pose, input.to_charger_m, payload_kg);
-  plan.tasks.reserve(input.tasks.size());
-  for (std::size_t k = 0; k < input.tasks.size(); ++k) {
-    const AutonomyTask& task = input.tasks[k];
-    if (task.payload_kg && !task.way.stations) payload_kg = *task.payload_kg;
-    auto legs = legs_of(task, pose, payload_kg, knots);
-    if (!legs) {
-      legs.error().field.insert(0, fmt::format("/tasks/{}", k));
-      return tl::unexpected(std::move(legs.error()));
-    }
-    TaskPlan::Task& into = plan.tasks.emplace_back();
-    into.legs = std::move(*legs);
-    plan.halts_stated =
-        plan.halts_stated || task.dwell_s || task.way.halts_stated() || forecast::states_halts(into.legs);
-    for (const PlannedLeg& leg : into.legs)
-      into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
-    into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);
-  }
-  return plan;
-}
-
-Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
-                                   const std::optional<double>& reserve, const robot::Battery& battery,
-                                   const LiveRobot& now) {
-  const double charge = given.value_or(now.state_of_charge);
-  if (!std::isfinite(charge)) {
-    return fail(Fault::infeasible, "/state_of_charge",
-                "is unknown: the robot has never reported battery voltage and current; state it in the "
-                "request");
-  }
-  const double live_sd = std::isfinite(now.state_of_charge_sd) ? now.state_of_charge_sd : 0;
-  return forecast::Charge{charge, given_sd.value_or(given ? 0 : live_sd),
-                          reserve.value_or(battery.reserve_fraction)};
-}
-
-Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
-                                const LiveRobot& now, planning::CostTableCache& tables,
-                                const std::stop_token& stop) {
-  const ModelInForce& model = *robot.model;
-  const forecast::Forecaster& forecaster = *robot.forecaster;
-  AutonomyOutput out;
-  TRY_ASSIGN(const auto charge, charge_of(input.state_of_charge, input.state_of_charge_sd,
-                                          input.reserve_fraction, model.robot.battery, now));
-  out.charge = charge;
-  out.charge_is_live = !input.state_of_charge;
-  out.payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
-  const double limit = model.robot.limits.payload_kg;
-  const auto too_heavy = [&](const std::string& field, double payload_kg) {
-    return invalid(field, fmt::format("is {}, must be at most the robot's limit of {}", payload_kg, limit));
-  };
-  if (input.payload_kg && *input.payload_kg > limit) return too_heavy("/payload_kg", *input.payload_kg);
-  for (std::size_t k = 0; k < input.tasks.size(); ++k)
-    if (plan.tasks[k].greatest_payload_kg > limit)
-      return too_heavy(fmt::format("/tasks/{}/payload_kg", k), plan.tasks[k].greatest_payload_kg);
-
-  const bool minimum_energy = input.driving == Driving::minimum_energy;
-  out.track = minimum_energy || paces_stated(input, plan) ? Track::stated : Track::usual;
-  out.pace = forecaster.habit.with(input.pace).middle;
-  if (plan.halts_stated || minimum_energy) out.pace.pause_s = 0;
-
-  const forecast::LegPricer pricer(model.robot, model.drive);
-  out.limitation = limitation_of(input, plan, pricer, robot, out);
-  const bool moves = !out.limitation || out.limitation->moves;
-  const bool with_plan = moves && (!input.tasks.empty() || !plan.from_here.empty());
-  std::optional<LeastEnergy> least;
-  if (minimum_energy || (input.compare_minimum_energy && with_plan)) {
-    TRY_ASSIGN(auto made, LeastEnergy::make(model, tables, input.value_of_time_w, stop));
-    least.emplace(std::move(made));
-  }
-
-  std::vector<PricedLeg> typical;
-  if (minimum_energy) {
-    TRY_ASSIGN(typical, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
-  } else {
-    typical = forecast::price_typical(forecaster, pricer, input.pace, out.payload_kg);
-  }
-  out.reach = forecast::reach(forecaster, *robot.battery, out.charge, forecast::sum_of(forecaster, typical));
-  if (!with_plan) return out;
-
-  std::optional<Pricing> best;
-  if (least) {
-    auto priced = at_least_energy(plan, *least);
-    if (priced)
-      best = std::move(*priced);
-    else if (minimum_energy)
-      return tl::unexpected(priced.error());
-  }
-  const auto look = [&](const Pricing& priced) {
-    return forecast::look_ahead(forecaster, *robot.battery, out.charge, priced.tasks, priced.from_here,
-                                pricer.standing_w(), input.confidence);
-  };
-  if (input.compare_fastest) {
-    TRY_ASSIGN(out.fastest, fastest_driving(plan, model, tables, input.confidence, look, stop));
-  }
-  if (minimum_energy) {
-    out.outlook = look(*best);
-    return out;
-  }
-  TRY_ASSIGN(const auto usual, as_usual(input, plan, pricer, forecaster));
-  out.outlook = look(usual);
-  if (best) out.minimum_energy_outlook = look(*best);
-  return out;
-}
-
-namespace {
-
 using described::Input;
 using described::Presence;
 
@@ -581,18 +468,12 @@ const Table<AutonomyAnswer>& pace_table() {
   using A = AutonomyAnswer;
   static const auto table =
       Table<A>()
-          .number_or_null(
-              "speed_m_s", [](const A& a) { return a.pace().speed_m_s; },
-              "forward speed; negative: backwards")
-          .number_or_null(
-              "acceleration_m_s2", [](const A& a) { return a.pace().acceleration_m_s2; },
-              "forward acceleration")
-          .number_or_null(
-              "yaw_rate_rad_s", [](const A& a) { return a.pace().yaw_rate_rad_s; },
-              "rate of turning, positive to the left")
-          .number_or_null(
-              "pause_s", [](const A& a) { return a.pace().pause_s; },
-              "mean time at rest after a leg, with 0 for legs without a halt")
+          .number_or_null("speed_m_s", AT(pace().speed_m_s), "forward speed; negative: backwards")
+          .number_or_null("acceleration_m_s2", AT(pace().acceleration_m_s2), "forward acceleration")
+          .number_or_null("yaw_rate_rad_s", AT(pace().yaw_rate_rad_s),
+                          "rate of turning, positive to the left")
+          .number_or_null("pause_s", AT(pace().pause_s),
+                          "mean time at rest after a leg, with 0 for legs without a halt")
           .value(
               "limitation",
               [](const A& a) {
@@ -610,12 +491,10 @@ const Table<AutonomyAnswer>& consumption_table() {
       Table<A>()
           .word("basis", basis, std::array{"recent_missions", "siblings", "model"},
                 "data on which the forecast is based")
-          .value(
-              "missions", [](const A& a) { return a.forecaster().missions; },
-              "number of this robot's missions used for the forecast")
-          .value(
-              "siblings", [](const A& a) { return a.forecaster().siblings; },
-              "number of robots with equal body and motors used for the forecast")
+          .value("missions", AT(forecaster().missions),
+                 "number of this robot's missions used for the forecast")
+          .value("siblings", AT(forecaster().siblings),
+                 "number of robots with equal body and motors used for the forecast")
           .value("siblings_pending", AT(robot.siblings_pending),
                  "the daemon has started and still reads missions of its siblings: the forecast will improve")
           .number_or_null("energy_per_m_j", AT(output.reach.energy_per_m_j),
@@ -733,6 +612,115 @@ const Table<AutonomyAnswer>& autonomy_table() {
 }
 
 }  // namespace
+
+Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
+  planning::Pose pose = input.start_pose.value_or(now.pose.value_or(planning::Pose{}));
+  double payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
+  TaskPlan plan;
+  std::size_t knots = 0;
+  plan.from_here = to_charger(input.charger, pose, input.to_charger_m, payload_kg);
+  plan.tasks.reserve(input.tasks.size());
+  for (std::size_t k = 0; k < input.tasks.size(); ++k) {
+    const AutonomyTask& task = input.tasks[k];
+    if (task.payload_kg && !task.way.stations) payload_kg = *task.payload_kg;
+    auto legs = legs_of(task, pose, payload_kg, knots);
+    if (!legs) {
+      legs.error().field.insert(0, fmt::format("/tasks/{}", k));
+      return tl::unexpected(std::move(legs.error()));
+    }
+    TaskPlan::Task& into = plan.tasks.emplace_back();
+    into.legs = std::move(*legs);
+    plan.halts_stated =
+        plan.halts_stated || task.dwell_s || task.way.halts_stated() || forecast::states_halts(into.legs);
+    for (const PlannedLeg& leg : into.legs)
+      into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
+    into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);
+  }
+  return plan;
+}
+
+Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
+                                   const std::optional<double>& reserve, const robot::Battery& battery,
+                                   const LiveRobot& now) {
+  const double charge = given.value_or(now.state_of_charge);
+  if (!std::isfinite(charge)) {
+    return fail(Fault::infeasible, "/state_of_charge",
+                "is unknown: the robot has never reported battery voltage and current; state it in the "
+                "request");
+  }
+  const double live_sd = std::isfinite(now.state_of_charge_sd) ? now.state_of_charge_sd : 0;
+  return forecast::Charge{charge, given_sd.value_or(given ? 0 : live_sd),
+                          reserve.value_or(battery.reserve_fraction)};
+}
+
+Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
+                                const LiveRobot& now, planning::CostTableCache& tables,
+                                const std::stop_token& stop) {
+  const ModelInForce& model = *robot.model;
+  const forecast::Forecaster& forecaster = *robot.forecaster;
+  AutonomyOutput out;
+  TRY_ASSIGN(const auto charge, charge_of(input.state_of_charge, input.state_of_charge_sd,
+                                          input.reserve_fraction, model.robot.battery, now));
+  out.charge = charge;
+  out.charge_is_live = !input.state_of_charge;
+  out.payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
+  const double limit = model.robot.limits.payload_kg;
+  const auto too_heavy = [&](const std::string& field, double payload_kg) {
+    return invalid(field, fmt::format("is {}, must be at most the robot's limit of {}", payload_kg, limit));
+  };
+  if (input.payload_kg && *input.payload_kg > limit) return too_heavy("/payload_kg", *input.payload_kg);
+  for (std::size_t k = 0; k < input.tasks.size(); ++k)
+    if (plan.tasks[k].greatest_payload_kg > limit)
+      return too_heavy(fmt::format("/tasks/{}/payload_kg", k), plan.tasks[k].greatest_payload_kg);
+
+  const bool minimum_energy = input.driving == Driving::minimum_energy;
+  out.track = minimum_energy || paces_stated(input, plan) ? Track::stated : Track::usual;
+  out.pace = forecaster.habit.with(input.pace).middle;
+  if (plan.halts_stated || minimum_energy) out.pace.pause_s = 0;
+
+  const forecast::LegPricer pricer(model.robot, model.drive);
+  out.limitation = limitation_of(input, plan, pricer, robot, out);
+  const bool moves = !out.limitation || out.limitation->moves;
+  const bool with_plan = moves && (!input.tasks.empty() || !plan.from_here.empty());
+  std::optional<LeastEnergy> least;
+  if (minimum_energy || (input.compare_minimum_energy && with_plan)) {
+    TRY_ASSIGN(auto made, LeastEnergy::make(model, tables, input.value_of_time_w, stop));
+    least.emplace(std::move(made));
+  }
+
+  std::vector<PricedLeg> typical;
+  if (minimum_energy) {
+    TRY_ASSIGN(typical, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
+  } else {
+    typical = forecast::price_typical(forecaster, pricer, input.pace, out.payload_kg);
+  }
+  out.reach = forecast::reach(forecaster, *robot.battery, out.charge, forecast::sum_of(forecaster, typical));
+  if (!with_plan) return out;
+
+  std::optional<Pricing> best;
+  if (least) {
+    auto priced = at_least_energy(plan, *least);
+    if (priced)
+      best = std::move(*priced);
+    else if (minimum_energy)
+      return tl::unexpected(priced.error());
+  }
+  const auto look = [&](const Pricing& priced) {
+    return forecast::look_ahead(forecaster, *robot.battery, out.charge, priced.tasks, priced.from_here,
+                                pricer.standing_w(), input.confidence);
+  };
+  if (input.compare_fastest) {
+    TRY_ASSIGN(out.fastest, fastest_driving(plan, model, tables, input.confidence, look, stop));
+  }
+  if (minimum_energy) {
+    out.outlook = look(*best);
+    return out;
+  }
+  TRY_ASSIGN(const auto usual, as_usual(input, plan, pricer, forecaster));
+  out.outlook = look(usual);
+  if (best) out.minimum_energy_outlook = look(*best);
+  return out;
+}
 
 bool AutonomyRequest::former() const {
   return std::ranges::any_of(input.tasks, AT(way.former));

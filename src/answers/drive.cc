@@ -209,6 +209,26 @@ double greatest_speed(const DriveInput& drive, const PathContext&) {
   return drive.problem.limits.speed_m_s;
 }
 
+// Positions may be null where the start is not given.
+Table<planning::Profile> make_columns(bool null_positions) {
+  using P = planning::Profile;
+  // Accelerations follow from these: their spans may last some tens of microseconds.
+  constexpr int nano = 9;
+  return Table<P>()
+      .column("time_s", &P::time_s, "time since the start", nano)
+      .column("distance_m", &P::distance_m, "distance from the start")
+      .column("x_m", &P::x_m, "place on the map", 4, null_positions)
+      .column("y_m", &P::y_m, "place on the map", 4, null_positions)
+      .column("heading_rad", &P::heading_rad, heading_words, 5, null_positions)
+      .column("speed_m_s", &P::speed_m_s, "forward speed; negative: backwards", nano)
+      .column("yaw_rate_rad_s", &P::yaw_rate_rad_s, "rate of turning, positive to the left", nano)
+      .column("acceleration_m_s2", &P::acceleration_m_s2, "forward acceleration")
+      .column("yaw_acceleration_rad_s2", &P::yaw_acceleration_rad_s2, "change of the rate of turning")
+      .column("payload_kg", &P::payload_kg, "payload from here on", 3)
+      .all_digits("power_w", &P::power_w, "power drawn from the battery", false)
+      .all_digits("energy_j", &P::energy_j, "drawn from the battery up to here", false);
+}
+
 }  // namespace
 
 void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> names) {
@@ -333,12 +353,9 @@ DriveInput undriven(const robot::RobotModel& robot) {
 const Table<Quantiles>& quantiles_table() {
   static const auto table = Table<Quantiles>("Values at the quantiles 5, 50 and 95 %")
                                 .named("quantiles")
-                                .number_or_null(
-                                    "p05", [](const Quantiles& q) { return q[0]; }, "5 of 100 are below")
-                                .number_or_null(
-                                    "p50", [](const Quantiles& q) { return q[1]; }, "the median")
-                                .number_or_null(
-                                    "p95", [](const Quantiles& q) { return q[2]; }, "95 of 100 are below");
+                                .number_or_null("p05", AT(at(0)), "5 of 100 are below")
+                                .number_or_null("p50", AT(at(1)), "the median")
+                                .number_or_null("p95", AT(at(2)), "95 of 100 are below");
   return table;
 }
 
@@ -350,30 +367,6 @@ const Table<ModelInForce>& model_table() {
                  "version of the robot's model that this is computed with");
   return table;
 }
-
-namespace {
-
-// Positions may be null where the start is not given.
-Table<planning::Profile> make_columns(bool null_positions) {
-  using P = planning::Profile;
-  // Accelerations follow from these: their spans may last some tens of microseconds.
-  constexpr int nano = 9;
-  return Table<P>()
-      .column("time_s", &P::time_s, "time since the start", nano)
-      .column("distance_m", &P::distance_m, "distance from the start")
-      .column("x_m", &P::x_m, "place on the map", 4, null_positions)
-      .column("y_m", &P::y_m, "place on the map", 4, null_positions)
-      .column("heading_rad", &P::heading_rad, heading_words, 5, null_positions)
-      .column("speed_m_s", &P::speed_m_s, "forward speed; negative: backwards", nano)
-      .column("yaw_rate_rad_s", &P::yaw_rate_rad_s, "rate of turning, positive to the left", nano)
-      .column("acceleration_m_s2", &P::acceleration_m_s2, "forward acceleration")
-      .column("yaw_acceleration_rad_s2", &P::yaw_acceleration_rad_s2, "change of the rate of turning")
-      .column("payload_kg", &P::payload_kg, "payload from here on", 3)
-      .all_digits("power_w", &P::power_w, "power drawn from the battery", false)
-      .all_digits("energy_j", &P::energy_j, "drawn from the battery up to here", false);
-}
-
-}  // namespace
 
 const Table<planning::Profile>& columns_table(bool null_positions) {
   static const auto known = make_columns(false), unknown = make_columns(true);

@@ -123,19 +123,6 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   return out;
 }
 
-}  // namespace
-
-Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot,
-                                const std::stop_token& stop) {
-  if (const auto* motion = std::get_if<GivenMotion>(&input.motion))
-    return of_motion(*motion, input.columns, *robot.model);
-  const auto& drive = std::get<DriveInput>(input.motion);
-  if (input.driving == Driving::usual) return of_habit(drive, robot);
-  return of_optimum(drive, input.columns, *robot.model, stop);
-}
-
-namespace {
-
 using Json = nlohmann::json;
 
 using described::Input;
@@ -212,53 +199,6 @@ void check_usual(Fields& fields, const EstimateInput& input, PathContext&) {
                                "regeneration", "limits"});
 }
 
-}  // namespace
-
-const Input<EstimateInput, PathContext>& estimate_input() {
-  using Part = Input<EstimateInput, PathContext>;
-  static const auto given =
-      Part()
-          .object(
-              "profile",
-              [](EstimateInput& input, const MotionColumns& columns) {
-                given_motion(input).points = points_of(columns);
-              },
-              {}, columns_input())
-          .number(
-              "payload_kg", [](EstimateInput& input) -> double& { return given_motion(input).payload_kg; },
-              not_negative, "at the start", 0,
-              [](const EstimateInput&, const PathContext& context) { return context.payload_limit_kg; })
-          .object(
-              "start_pose",
-              [](EstimateInput& input, const planning::Pose& pose) {
-                given_motion(input).start = {pose.x_m, pose.y_m, pose.heading_rad};
-              },
-              "start of the motion; default for a path: the origin", pose_input(), Presence::optional);
-  static const auto planned =
-      Part()
-          .choice("driving", &EstimateInput::driving, driving_names,
-                  "driving model of a path. minimum_energy: its minimum-energy motion, as returned by the "
-                  "profile operation and independent of the robot's history; usual: the robot's own pace and "
-                  "the consumption estimated from its missions, for robots that do not drive the planner's "
-                  "profile. deadline_s, value_of_time_w, end speeds, limits, regeneration and columns are "
-                  "valid only with minimum_energy",
-                  static_cast<std::size_t>(Driving::minimum_energy))
-          .include(drive_input(),
-                   [](EstimateInput& input) -> DriveInput& { return std::get<DriveInput>(input.motion); })
-          .check(check_usual);
-  static const auto input =
-      Part("A motion to estimate: a profile, or a path")
-          .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)
-          .either(given, planned);
-  return input;
-}
-
-Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel& robot) {
-  return estimate_input().read(request, {.motion = undriven(robot)}, {robot.limits.payload_kg});
-}
-
-namespace {
-
 struct EstimateAnswer {
   const EstimateInput& input;
   const EstimateOutput& output;
@@ -313,11 +253,63 @@ const Table<EstimateAnswer>& estimate_table() {
               "profile", [](const A& a) -> const auto& { return *a.output.columns; },
               "the motion over time, if columns are requested; positions are null without start_pose",
               columns_table(true))
-          .only([](const A& a) { return a.output.columns.has_value(); });
+          .only(AT(output.columns.has_value()));
   return table;
 }
 
 }  // namespace
+
+Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot,
+                                const std::stop_token& stop) {
+  if (const auto* motion = std::get_if<GivenMotion>(&input.motion))
+    return of_motion(*motion, input.columns, *robot.model);
+  const auto& drive = std::get<DriveInput>(input.motion);
+  if (input.driving == Driving::usual) return of_habit(drive, robot);
+  return of_optimum(drive, input.columns, *robot.model, stop);
+}
+
+const Input<EstimateInput, PathContext>& estimate_input() {
+  using Part = Input<EstimateInput, PathContext>;
+  static const auto given =
+      Part()
+          .object(
+              "profile",
+              [](EstimateInput& input, const MotionColumns& columns) {
+                given_motion(input).points = points_of(columns);
+              },
+              {}, columns_input())
+          .number(
+              "payload_kg", [](EstimateInput& input) -> double& { return given_motion(input).payload_kg; },
+              not_negative, "at the start", 0,
+              [](const EstimateInput&, const PathContext& context) { return context.payload_limit_kg; })
+          .object(
+              "start_pose",
+              [](EstimateInput& input, const planning::Pose& pose) {
+                given_motion(input).start = {pose.x_m, pose.y_m, pose.heading_rad};
+              },
+              "start of the motion; default for a path: the origin", pose_input(), Presence::optional);
+  static const auto planned =
+      Part()
+          .choice("driving", &EstimateInput::driving, driving_names,
+                  "driving model of a path. minimum_energy: its minimum-energy motion, as returned by the "
+                  "profile operation and independent of the robot's history; usual: the robot's own pace and "
+                  "the consumption estimated from its missions, for robots that do not drive the planner's "
+                  "profile. deadline_s, value_of_time_w, end speeds, limits, regeneration and columns are "
+                  "valid only with minimum_energy",
+                  static_cast<std::size_t>(Driving::minimum_energy))
+          .include(drive_input(),
+                   [](EstimateInput& input) -> DriveInput& { return std::get<DriveInput>(input.motion); })
+          .check(check_usual);
+  static const auto input =
+      Part("A motion to estimate: a profile, or a path")
+          .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)
+          .either(given, planned);
+  return input;
+}
+
+Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel& robot) {
+  return estimate_input().read(request, {.motion = undriven(robot)}, {robot.limits.payload_kg});
+}
 
 described::Schemas estimate_schemas() {
   return {{"estimate-request", estimate_input().schema()}, {"estimate", estimate_table().schema()}};

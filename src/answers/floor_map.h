@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "history/floor.h"
+#include "history/store.h"
 #include "signals/sample.h"
 
 // Where on the floor a fleet spends its energy, and where its consumption differs from its models.

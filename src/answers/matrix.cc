@@ -50,6 +50,240 @@ forecast::PlannedLeg leg_of(const planning::Stretch& stretch, double payload_kg)
   return leg;
 }
 
+using Json = nlohmann::json;
+
+using described::Count;
+using described::Input;
+using described::Presence;
+using described::Table;
+using planning::MatrixTask;
+using Robot = MatrixInput::Robot;
+
+constexpr Count robots_of_matrix{1, 10'000}, tasks_of_matrix{1, 10'000};
+// Of minimum-energy and of usual driving, which takes ten times the work, 11 s of CPU for so many.
+constexpr std::size_t max_cells = 4'000'000, max_usual_cells = 1'000'000;
+constexpr std::size_t rows_per_piece = 16;
+constexpr std::chrono::milliseconds tables_piece{20};  // most are there already, one to be built takes longer
+constexpr std::size_t max_robot_id_bytes = 128, max_task_id_bytes = 200;
+constexpr int places = 3;  // of energies and durations: millijoules and milliseconds
+constexpr int probability_places = 4;
+
+struct ReadLeg {
+  Way way;
+  planning::PathOptions options;
+  planning::Leg leg;
+};
+
+void make_leg(Fields& fields, ReadLeg& read, PathContext&) {
+  if (!fields.ok() || read.way.path.empty()) return;
+  Result<planning::Path> path = path_of(read.way, read.options);
+  if (path) {
+    read.leg = planning::leg_of(*path);
+  } else {
+    path.error().field = fields.pointer(path.error().field.substr(1));
+    fields.fault(std::move(path.error()));
+  }
+}
+
+const Input<ReadLeg, PathContext>& leg_input() {
+  static const auto input = Input<ReadLeg, PathContext>("A route; empty: none to drive")
+                                .named("leg")
+                                .object("start_pose", AT(options.start),
+                                        "where a path with places on the map begins; default: the origin",
+                                        pose_input(), Presence::optional)
+                                .include(route_input(), &ReadLeg::way)
+                                .include(former_way_input(), &ReadLeg::way)
+                                .check(make_leg);
+  return input;
+}
+
+const Input<Robot>& robot_input() {
+  static const auto pose =
+      Input<planning::Pose>()
+          .include(point_input<planning::Pose>("place on the map"), std::identity())
+          .number("heading_rad", &planning::Pose::heading_rad, heading_bounds_rad, heading_words, 0);
+  static const auto input =
+      Input<Robot>()
+          .text("robot_id", &Robot::robot_id, max_robot_id_bytes, "the robot of this row")
+          .object("pose", &Robot::pose, "start of the robot; default: its last reported pose", pose)
+          .number("state_of_charge", &Robot::state_of_charge, fraction,
+                  "state of charge; default: the live one");
+  return input;
+}
+
+// A column of the request, for so many robots.
+struct ReadTask {
+  std::string task_id;
+  MatrixTask task;
+  bool former = false;
+};
+struct MatrixContext : PathContext {
+  std::size_t robots = 0;
+};
+
+void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
+  const Json* empty = fields.member("empty");
+  if (empty == nullptr) return;
+  const auto add = [&](const Json& leg, std::string at) {
+    ReadLeg one;
+    leg_input().nested(leg, std::move(at), one, context, fields);
+    read.task.empty.push_back(std::move(one.leg));
+    read.former = read.former || one.way.former;
+  };
+  if (!empty->is_array()) return add(*empty, fields.pointer("empty"));
+  if (empty->size() != context.robots)
+    fields.fault("empty", fmt::format("has {} legs, must have one for each of {} robots", empty->size(),
+                                      context.robots));
+  for (std::size_t k = 0; k < empty->size() && fields.ok(); ++k)
+    add((*empty)[k], fmt::format("{}/{}", fields.pointer("empty"), k));
+}
+
+void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
+  const MatrixTask& task = read.task;
+  const auto& [pickup, dropoff, pickup_dwell_s, dropoff_dwell_s] = task.stations;
+  if (task.empty.empty() && !pickup) fields.fault("pickup", "is required where \"empty\" is not given");
+  if (!task.loaded && (!pickup || !dropoff))
+    fields.fault(pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");
+  if (fields.ok() && !task.loaded &&
+      std::hypot(dropoff->x_m - pickup->x_m, dropoff->y_m - pickup->y_m) > planning::longest_leg_m)
+    fields.fault("dropoff", fmt::format("is farther than {} m from the pick-up", planning::longest_leg_m));
+}
+
+const Input<ReadTask, MatrixContext>& matrix_task_input() {
+  static const auto input =
+      Input<ReadTask, MatrixContext>()
+          .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
+          .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
+                  "carried from the pick-up to the drop-off", 0)
+          .include(stations_input(), AT(task.stations))
+          .custom("empty",
+                  {{"oneOf", {leg_input().of_member(), described::of_array(leg_input().of_member())}}},
+                  "route to the pick-up, common to all robots or one for each in order; replaces a turn "
+                  "towards it and a straight line",
+                  read_empty)
+          .object(
+              "loaded",
+              [](ReadTask& read, ReadLeg&& leg) {
+                read.task.loaded = std::move(leg.leg);
+                read.former = read.former || leg.way.former;
+              },
+              "route from the pick-up to the drop-off, in place of a turn and a straight line", leg_input(),
+              Presence::optional)
+          .check(check_stations);
+  return input;
+}
+
+// Checked before any robot and task is read.
+void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
+  if (input.driving == Driving::usual) refuse_beside_usual(fields, {"value_of_time_w", "regeneration"});
+  const Json* robots = described::read_array(fields, "robots", robots_of_matrix, Presence::required);
+  const Json* tasks = described::read_array(fields, "tasks", tasks_of_matrix, Presence::required);
+  if (!fields.ok()) return;
+  context.robots = robots->size();
+  const bool usual = input.driving == Driving::usual;
+  const std::size_t cells = robots->size() * tasks->size(), most = usual ? max_usual_cells : max_cells;
+  if (cells > most)
+    fields.fault({Fault::too_large, fields.pointer("tasks"),
+                  fmt::format("{} robots by {} tasks are {} cells, at most {} are allowed{}", robots->size(),
+                              tasks->size(), cells, most, usual ? " of usual driving" : "")});
+}
+
+const Table<MatrixRow>& row_table() {
+  using planning::name_of;
+  using planning::Obstacle;
+  using Why = MatrixRow::Infeasible;
+  using R = MatrixRow;
+  static const auto infeasible =
+      Table<Why>()
+          .word(
+              "reason", [](const Why& why) { return name_of(why.reason); },
+              std::array{name_of(Obstacle::model), name_of(Obstacle::pose), name_of(Obstacle::payload),
+                         name_of(Obstacle::limits)},
+              "model: the robot is unknown or has no model; pose: its position is unknown and the task does "
+              "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
+              "within its limits with this payload")
+          .value("detail", &Why::detail, "the same in a sentence")
+          .texts("task_ids", &Why::task_ids, "ids of the tasks, in the order of the request");
+  static const auto table =
+      Table<R>()
+          .value("robot_id", &R::robot_id, "the robot of this row")
+          .value("model_version", &R::model_version, "null where the robot has no model")
+          .value("interpolation_error", &R::interpolation_error,
+                 "largest relative error of the interpolated costs compared with the planner's; null for "
+                 "usual driving, which is computed leg by leg")
+          .texts("neglected_effects", &R::neglected_effects,
+                 "adopted effects that depend on the position on the floor, which are not included in these "
+                 "costs")
+          .column("energy_j", &R::energy_j,
+                  "energy from the battery, dwells included; for usual driving the mean of its forecast; "
+                  "null where infeasible",
+                  places, true)
+          .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
+          .column("success_probability", &R::success_probability,
+                  "probability that the robot ends this task alone, in the requested driving model, with at "
+                  "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
+                  probability_places, true)
+          .column("charge_needed", &R::charge_needed,
+                  "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
+                  "which it ends with the reserve with a probability of 95 %; null where the charge "
+                  "suffices, where a full one does not, and where infeasible",
+                  probability_places, true)
+          .column("available_in_s", &R::available_in_s,
+                  "time at its charger until the robot has that charge, if charge arrives evenly until the "
+                  "charger's end, which is at most too long; 0 where the charge suffices; null where it is "
+                  "not known: not at a charger, or a given charge",
+                  places, true)
+          .value("siblings_pending", &R::siblings_pending,
+                 "of forecasts while a started daemon still reads missions of its siblings",
+                 {{"const", true}})
+          .only(&R::siblings_pending)
+          .list("infeasible", &R::infeasible, "infeasible tasks of this robot, by reason", infeasible);
+  return table;
+}
+
+// Without the rows.
+const Table<MatrixInput>& head_table() {
+  static const auto table =
+      Table<MatrixInput>()
+          .word("driving", &MatrixInput::driving, driving_names, "as requested, or the default")
+          .value("value_of_time_w", AT(options.value_of_time_w), "requested value of time")
+          .texts("task_ids", &MatrixInput::task_ids, "ids in the order of the columns")
+          .texts("tasks", &MatrixInput::task_ids, "task_ids by its former name", {{"deprecated", true}});
+  return table;
+}
+
+const Input<MatrixInput, MatrixContext>& matrix_input() {
+  static const auto input =
+      Input<MatrixInput, MatrixContext>(
+          "Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
+          .choice("driving", &MatrixInput::driving, driving_names,
+                  "driving model. minimum_energy: minimum-energy motions from stop to stop, equal for equal "
+                  "robots and independent of their history; usual: each robot's own pace and the consumption "
+                  "estimated from its missions, for fleets that do not drive the planner's profiles. "
+                  "value_of_time_w and regeneration are valid only with minimum_energy",
+                  static_cast<std::size_t>(Driving::minimum_energy))
+          .number("value_of_time_w", AT(options.value_of_time_w), value_of_time_bounds_w,
+                  "value of time, added to the energy", 0)
+          .number("regeneration", AT(options.regeneration), fraction,
+                  "recovered share of braking power; replaces that of each robot file")
+          .number("reserve_fraction", &MatrixInput::reserve_fraction, fraction,
+                  "charge to be left after a task, for its success probability; default the robot file's")
+          .check(check_size)
+          .list("robots", &MatrixInput::robots, robots_of_matrix,
+                "the rows: ids of robots, or robots with a pose and a charge",
+                described::OrText(&Robot::robot_id, "robot id; the start is its last reported pose",
+                                  robot_input()))
+          .list(
+              "tasks",
+              [](MatrixInput& matrix, ReadTask&& read) {
+                matrix.task_ids.push_back(std::move(read.task_id));
+                matrix.tasks.push_back(std::move(read.task));
+                matrix.former = matrix.former || read.former;
+              },
+              tasks_of_matrix, "the columns", matrix_task_input());
+  return input;
+}
+
 }  // namespace
 
 struct Matrix::State {
@@ -304,246 +538,6 @@ MatrixRow Matrix::row(std::size_t r, const std::stop_token& stop) const {
   }
   return out;
 }
-
-namespace {
-
-using Json = nlohmann::json;
-
-using described::Count;
-using described::Input;
-using described::Presence;
-using described::Table;
-using planning::MatrixTask;
-using Robot = MatrixInput::Robot;
-
-constexpr Count robots_of_matrix{1, 10'000}, tasks_of_matrix{1, 10'000};
-// Of minimum-energy and of usual driving, which takes ten times the work, 11 s of CPU for so many.
-constexpr std::size_t max_cells = 4'000'000, max_usual_cells = 1'000'000;
-constexpr std::size_t rows_per_piece = 16;
-constexpr std::chrono::milliseconds tables_piece{20};  // most are there already, one to be built takes longer
-constexpr std::size_t max_robot_id_bytes = 128, max_task_id_bytes = 200;
-constexpr int places = 3;  // of energies and durations: millijoules and milliseconds
-constexpr int probability_places = 4;
-
-struct ReadLeg {
-  Way way;
-  planning::PathOptions options;
-  planning::Leg leg;
-};
-
-void make_leg(Fields& fields, ReadLeg& read, PathContext&) {
-  if (!fields.ok() || read.way.path.empty()) return;
-  Result<planning::Path> path = path_of(read.way, read.options);
-  if (path) {
-    read.leg = planning::leg_of(*path);
-  } else {
-    path.error().field = fields.pointer(path.error().field.substr(1));
-    fields.fault(std::move(path.error()));
-  }
-}
-
-const Input<ReadLeg, PathContext>& leg_input() {
-  static const auto input = Input<ReadLeg, PathContext>("A route; empty: none to drive")
-                                .named("leg")
-                                .object("start_pose", AT(options.start),
-                                        "where a path with places on the map begins; default: the origin",
-                                        pose_input(), Presence::optional)
-                                .include(route_input(), &ReadLeg::way)
-                                .include(former_way_input(), &ReadLeg::way)
-                                .check(make_leg);
-  return input;
-}
-
-const Input<Robot>& robot_input() {
-  static const auto pose =
-      Input<planning::Pose>()
-          .include(point_input<planning::Pose>("place on the map"), std::identity())
-          .number("heading_rad", &planning::Pose::heading_rad, heading_bounds_rad, heading_words, 0);
-  static const auto input =
-      Input<Robot>()
-          .text("robot_id", &Robot::robot_id, max_robot_id_bytes, "the robot of this row")
-          .object("pose", &Robot::pose, "start of the robot; default: its last reported pose", pose)
-          .number("state_of_charge", &Robot::state_of_charge, fraction,
-                  "state of charge; default: the live one");
-  return input;
-}
-
-// A column of the request, for so many robots.
-struct ReadTask {
-  std::string task_id;
-  MatrixTask task;
-  bool former = false;
-};
-struct MatrixContext : PathContext {
-  std::size_t robots = 0;
-};
-
-void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
-  const Json* empty = fields.member("empty");
-  if (empty == nullptr) return;
-  const auto add = [&](const Json& leg, std::string at) {
-    ReadLeg one;
-    leg_input().nested(leg, std::move(at), one, context, fields);
-    read.task.empty.push_back(std::move(one.leg));
-    read.former = read.former || one.way.former;
-  };
-  if (!empty->is_array()) return add(*empty, fields.pointer("empty"));
-  if (empty->size() != context.robots)
-    fields.fault("empty", fmt::format("has {} legs, must have one for each of {} robots", empty->size(),
-                                      context.robots));
-  for (std::size_t k = 0; k < empty->size() && fields.ok(); ++k)
-    add((*empty)[k], fmt::format("{}/{}", fields.pointer("empty"), k));
-}
-
-void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
-  const MatrixTask& task = read.task;
-  const auto& [pickup, dropoff, pickup_dwell_s, dropoff_dwell_s] = task.stations;
-  if (task.empty.empty() && !pickup) fields.fault("pickup", "is required where \"empty\" is not given");
-  if (!task.loaded && (!pickup || !dropoff))
-    fields.fault(pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");
-  if (fields.ok() && !task.loaded &&
-      std::hypot(dropoff->x_m - pickup->x_m, dropoff->y_m - pickup->y_m) > planning::longest_leg_m)
-    fields.fault("dropoff", fmt::format("is farther than {} m from the pick-up", planning::longest_leg_m));
-}
-
-const Input<ReadTask, MatrixContext>& matrix_task_input() {
-  static const auto input =
-      Input<ReadTask, MatrixContext>()
-          .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
-          .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
-                  "carried from the pick-up to the drop-off", 0)
-          .include(stations_input(), AT(task.stations))
-          .custom("empty",
-                  {{"oneOf", {leg_input().of_member(), described::of_array(leg_input().of_member())}}},
-                  "route to the pick-up, common to all robots or one for each in order; replaces a turn "
-                  "towards it and a straight line",
-                  read_empty)
-          .object(
-              "loaded",
-              [](ReadTask& read, ReadLeg&& leg) {
-                read.task.loaded = std::move(leg.leg);
-                read.former = read.former || leg.way.former;
-              },
-              "route from the pick-up to the drop-off, in place of a turn and a straight line", leg_input(),
-              Presence::optional)
-          .check(check_stations);
-  return input;
-}
-
-// Checked before any robot and task is read.
-void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
-  if (input.driving == Driving::usual) refuse_beside_usual(fields, {"value_of_time_w", "regeneration"});
-  const Json* robots = described::read_array(fields, "robots", robots_of_matrix, Presence::required);
-  const Json* tasks = described::read_array(fields, "tasks", tasks_of_matrix, Presence::required);
-  if (!fields.ok()) return;
-  context.robots = robots->size();
-  const bool usual = input.driving == Driving::usual;
-  const std::size_t cells = robots->size() * tasks->size(), most = usual ? max_usual_cells : max_cells;
-  if (cells > most)
-    fields.fault({Fault::too_large, fields.pointer("tasks"),
-                  fmt::format("{} robots by {} tasks are {} cells, at most {} are allowed{}", robots->size(),
-                              tasks->size(), cells, most, usual ? " of usual driving" : "")});
-}
-
-const Table<MatrixRow>& row_table() {
-  using planning::name_of;
-  using planning::Obstacle;
-  using Why = MatrixRow::Infeasible;
-  using R = MatrixRow;
-  static const auto infeasible =
-      Table<Why>()
-          .word(
-              "reason", [](const Why& why) { return name_of(why.reason); },
-              std::array{name_of(Obstacle::model), name_of(Obstacle::pose), name_of(Obstacle::payload),
-                         name_of(Obstacle::limits)},
-              "model: the robot is unknown or has no model; pose: its position is unknown and the task does "
-              "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
-              "within its limits with this payload")
-          .value("detail", &Why::detail, "the same in a sentence")
-          .texts("task_ids", &Why::task_ids, "ids of the tasks, in the order of the request");
-  static const auto table =
-      Table<R>()
-          .value("robot_id", &R::robot_id, "the robot of this row")
-          .value("model_version", &R::model_version, "null where the robot has no model")
-          .value("interpolation_error", &R::interpolation_error,
-                 "largest relative error of the interpolated costs compared with the planner's; null for "
-                 "usual driving, which is computed leg by leg")
-          .texts("neglected_effects", &R::neglected_effects,
-                 "adopted effects that depend on the position on the floor, which are not included in these "
-                 "costs")
-          .column("energy_j", &R::energy_j,
-                  "energy from the battery, dwells included; for usual driving the mean of its forecast; "
-                  "null where infeasible",
-                  places, true)
-          .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
-          .column("success_probability", &R::success_probability,
-                  "probability that the robot ends this task alone, in the requested driving model, with at "
-                  "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
-                  probability_places, true)
-          .column("charge_needed", &R::charge_needed,
-                  "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
-                  "which it ends with the reserve with a probability of 95 %; null where the charge "
-                  "suffices, where a full one does not, and where infeasible",
-                  probability_places, true)
-          .column("available_in_s", &R::available_in_s,
-                  "time at its charger until the robot has that charge, if charge arrives evenly until the "
-                  "charger's end, which is at most too long; 0 where the charge suffices; null where it is "
-                  "not known: not at a charger, or a given charge",
-                  places, true)
-          .value("siblings_pending", &R::siblings_pending,
-                 "of forecasts while a started daemon still reads missions of its siblings",
-                 {{"const", true}})
-          .only(&R::siblings_pending)
-          .list("infeasible", &R::infeasible, "infeasible tasks of this robot, by reason", infeasible);
-  return table;
-}
-
-// Without the rows.
-const Table<MatrixInput>& head_table() {
-  static const auto table =
-      Table<MatrixInput>()
-          .word(
-              "driving", [](const MatrixInput& input) -> std::string_view { return name_of(input.driving); },
-              driving_names, "as requested, or the default")
-          .value("value_of_time_w", AT(options.value_of_time_w), "requested value of time")
-          .texts("task_ids", &MatrixInput::task_ids, "ids in the order of the columns")
-          .texts("tasks", &MatrixInput::task_ids, "task_ids by its former name", {{"deprecated", true}});
-  return table;
-}
-
-const Input<MatrixInput, MatrixContext>& matrix_input() {
-  static const auto input =
-      Input<MatrixInput, MatrixContext>(
-          "Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
-          .choice("driving", &MatrixInput::driving, driving_names,
-                  "driving model. minimum_energy: minimum-energy motions from stop to stop, equal for equal "
-                  "robots and independent of their history; usual: each robot's own pace and the consumption "
-                  "estimated from its missions, for fleets that do not drive the planner's profiles. "
-                  "value_of_time_w and regeneration are valid only with minimum_energy",
-                  static_cast<std::size_t>(Driving::minimum_energy))
-          .number("value_of_time_w", AT(options.value_of_time_w), value_of_time_bounds_w,
-                  "value of time, added to the energy", 0)
-          .number("regeneration", AT(options.regeneration), fraction,
-                  "recovered share of braking power; replaces that of each robot file")
-          .number("reserve_fraction", &MatrixInput::reserve_fraction, fraction,
-                  "charge to be left after a task, for its success probability; default the robot file's")
-          .check(check_size)
-          .list("robots", &MatrixInput::robots, robots_of_matrix,
-                "the rows: ids of robots, or robots with a pose and a charge",
-                described::OrText(&Robot::robot_id, "robot id; the start is its last reported pose",
-                                  robot_input()))
-          .list(
-              "tasks",
-              [](MatrixInput& matrix, ReadTask&& read) {
-                matrix.task_ids.push_back(std::move(read.task_id));
-                matrix.tasks.push_back(std::move(read.task));
-                matrix.former = matrix.former || read.former;
-              },
-              tasks_of_matrix, "the columns", matrix_task_input());
-  return input;
-}
-
-}  // namespace
 
 described::Schemas matrix_schemas() {
   static const auto answer = Table<MatrixInput>("Cost of every task with every robot")

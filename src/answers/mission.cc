@@ -192,9 +192,7 @@ const Table<Accounts>& ledger_table() {
           .value("battery_j", &Accounts::battery_j,
                  "energy from the battery, the sum of the terms where it is measured")
           .object("terms_j", &Accounts::ledger, {}, terms_table())
-          .value(
-              "sum_j", [](const Accounts& a) { return a.ledger.total(); },
-              "sum of the terms, recovered counted negative")
+          .value("sum_j", AT(ledger.total()), "sum of the terms, recovered counted negative")
           .value("closure_relative", closure_relative, "|sum - battery| / |battery|", {{"minimum", 0}});
   return table;
 }
@@ -234,11 +232,9 @@ const Table<Mission>& mission_table() {
           .value("id", &M::key, "number of the mission, as in /v1/missions/{id}")
           .value("robot_id", &M::robot_id, "the robot's id, as in its telemetry and its file")
           .value("mission_id", &M::mission_id, "the robot's identifier of the mission")
-          .word(
-              "state", [](const M& m) { return history::name(m.state); },
-              history::names_of<history::MissionState>,
-              "open: running; unfinished: its end was never reported; superseded: another mission began "
-              "before its end; interrupted: the service was stopped")
+          .word("state", &M::state, history::names_of<history::MissionState>,
+                "open: running; unfinished: its end was never reported; superseded: another mission began "
+                "before its end; interrupted: the service was stopped")
           .value("implicit", &M::implicit, "opened by the service, without an announcement by the robot")
           .value("incomplete", &M::incomplete,
                  "has parts without telemetry, which are not included in the energy")

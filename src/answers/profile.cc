@@ -65,37 +65,6 @@ Result<const planning::Planner*> planner_for(const DriveInput& input, const Mode
   return &own.emplace(std::move(made));
 }
 
-}  // namespace
-
-Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, const std::stop_token& stop) {
-  TRY_ASSIGN(const auto path, path_of(input.way, input.options));
-  std::optional<planning::Planner> own;
-  TRY_ASSIGN(const auto planner, planner_for(input, model, own));
-  return planner->plan(path, input.problem, stop);
-}
-
-Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
-                              const std::stop_token& stop) {
-  TRY_ASSIGN(const auto path, path_of(input.drive.way, input.drive.options));
-  std::optional<planning::Planner> own;
-  TRY_ASSIGN(const auto planner, planner_for(input.drive, model, own));
-  TRY_ASSIGN(auto plan, planner->plan(path, input.drive.problem, stop));
-  return compared(*planner, input, path, std::move(plan), stop);
-}
-
-std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model) {
-  if (!is_brief(input.drive.way.path) || input.pareto_points > 0 || input.drive.problem.regeneration)
-    return std::nullopt;
-  const auto path = path_of(input.drive.way, input.drive.options);
-  if (!path) return std::nullopt;
-  auto plan = model.planner.plan_at_once(*path, input.drive.problem);
-  if (!plan) return std::nullopt;
-  auto out = compared(model.planner, input, *path, std::move(*plan), {});
-  return out ? std::optional(std::move(*out)) : std::nullopt;
-}
-
-namespace {
-
 constexpr std::int64_t max_pareto_points = 200;
 
 using described::Table;
@@ -121,8 +90,7 @@ const Table<Certificate>& certificate_table() {
       planning::name_of(Method::interior_point), planning::name_of(Method::mixed)};
   static const auto table =
       Table<C>()
-          .word(
-              "method", [](const C& c) { return planning::name_of(c.method); }, methods, "how it was solved")
+          .word("method", &C::method, methods, "how it was solved")
           .value("gap_j", &C::gap_j,
                  "energy plus value of time, minus gap_j, is a lower bound of the optimum where the problem "
                  "is convex")
@@ -205,38 +173,6 @@ const Table<ProfileAnswer>& baselines_table() {
   return table;
 }
 
-}  // namespace
-
-const described::Input<ProfileInput, PathContext>& profile_input() {
-  static const auto input =
-      described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
-          .include(drive_input(), &ProfileInput::drive)
-          .number(
-              "energy_budget_j", AT(drive.problem.energy_budget_j), positive,
-              "the fastest motion that takes at most so much energy; without deadline_s and value_of_time_w")
-          .check([](Fields& fields, ProfileInput& profile, PathContext&) {
-            const planning::Problem& problem = profile.drive.problem;
-            if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
-              fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
-          })
-          .boolean("columns", &ProfileInput::columns,
-                   "false leaves the profile out; a motion of more than 500000 rows is refused", true)
-          .boolean("baseline_columns", &ProfileInput::baseline_columns,
-                   "true gives the trapezoid's and the triangle's motion over time too", false)
-          .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
-                   "points of the front of energy against time", 0);
-  return input;
-}
-
-Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot) {
-  TRY_ASSIGN(auto input,
-             profile_input().read(request, {.drive = undriven(robot)}, {robot.limits.payload_kg}));
-  input.drive.problem.rows = input.columns;
-  return input;
-}
-
-namespace {
-
 const Table<ProfileAnswer>& profile_table() {
   static const auto point = Table<PlanCost>()
                                 .value("duration_s", &PlanCost::duration_s, "duration of this compromise")
@@ -277,6 +213,61 @@ const Table<ProfileAnswer>& profile_table() {
 }
 
 }  // namespace
+
+Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, const std::stop_token& stop) {
+  TRY_ASSIGN(const auto path, path_of(input.way, input.options));
+  std::optional<planning::Planner> own;
+  TRY_ASSIGN(const auto planner, planner_for(input, model, own));
+  return planner->plan(path, input.problem, stop);
+}
+
+Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
+                              const std::stop_token& stop) {
+  TRY_ASSIGN(const auto path, path_of(input.drive.way, input.drive.options));
+  std::optional<planning::Planner> own;
+  TRY_ASSIGN(const auto planner, planner_for(input.drive, model, own));
+  TRY_ASSIGN(auto plan, planner->plan(path, input.drive.problem, stop));
+  return compared(*planner, input, path, std::move(plan), stop);
+}
+
+std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model) {
+  if (!is_brief(input.drive.way.path) || input.pareto_points > 0 || input.drive.problem.regeneration)
+    return std::nullopt;
+  const auto path = path_of(input.drive.way, input.drive.options);
+  if (!path) return std::nullopt;
+  auto plan = model.planner.plan_at_once(*path, input.drive.problem);
+  if (!plan) return std::nullopt;
+  auto out = compared(model.planner, input, *path, std::move(*plan), {});
+  return out ? std::optional(std::move(*out)) : std::nullopt;
+}
+
+const described::Input<ProfileInput, PathContext>& profile_input() {
+  static const auto input =
+      described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
+          .include(drive_input(), &ProfileInput::drive)
+          .number(
+              "energy_budget_j", AT(drive.problem.energy_budget_j), positive,
+              "the fastest motion that takes at most so much energy; without deadline_s and value_of_time_w")
+          .check([](Fields& fields, ProfileInput& profile, PathContext&) {
+            const planning::Problem& problem = profile.drive.problem;
+            if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
+              fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
+          })
+          .boolean("columns", &ProfileInput::columns,
+                   "false leaves the profile out; a motion of more than 500000 rows is refused", true)
+          .boolean("baseline_columns", &ProfileInput::baseline_columns,
+                   "true gives the trapezoid's and the triangle's motion over time too", false)
+          .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
+                   "points of the front of energy against time", 0);
+  return input;
+}
+
+Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot) {
+  TRY_ASSIGN(auto input,
+             profile_input().read(request, {.drive = undriven(robot)}, {robot.limits.payload_kg}));
+  input.drive.problem.rows = input.columns;
+  return input;
+}
 
 described::Schemas profile_schemas() {
   described::Schema request = profile_input().schema();

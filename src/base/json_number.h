@@ -3,7 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "base/resolution.h"
+#include "base/json_writer.h"
 
 namespace joulecast {
 
@@ -11,6 +11,12 @@ namespace joulecast {
 // take json_fwd.hpp.
 inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(resolved(value)) : nlohmann::json(nullptr);
+}
+
+// The text of a document, in which bytes that are no UTF-8 are replaced.
+template <class Json>
+std::string json_text(const Json& document) {
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 // The number that a value is; NaN for any other value.

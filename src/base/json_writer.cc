@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 
-#include "base/resolution.h"
 #include "base/utc_time.h"
 
 namespace joulecast {

@@ -9,6 +9,14 @@
 
 namespace joulecast {
 
+// Numbers of answers nearer to 0 than this are 0: in SI units no quantity and no probability of the service
+// is this accurate, and the remainder of a far tail (1e-223) looks like a value.
+inline constexpr double answer_resolution = 1e-18;
+
+constexpr double resolved(double value) {
+  return value < answer_resolution && value > -answer_resolution ? 0.0 : value;
+}
+
 // Writes JSON text front to back. Doubles that are not finite become null, so that "not measured" is never a
 // number. Several times faster than building a document first, which long series need.
 class JsonWriter {
@@ -23,7 +31,7 @@ class JsonWriter {
   JsonWriter& end_array();
   JsonWriter& key(std::string_view name);
 
-  JsonWriter& value(double number);  // resolved() (base/resolution.h), in the shortest text that reads back
+  JsonWriter& value(double number);  // resolved(), in the shortest text that reads back
   JsonWriter& exact(double number);  // as it is, for evidence: the text reads back as the same double
   JsonWriter& value(std::int64_t number);
   JsonWriter& value(std::uint64_t number);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <boost/locale/utf.hpp>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -34,6 +35,14 @@ std::optional<T> to_number(std::string_view text) {
   if constexpr (std::is_floating_point_v<T>)
     if (!std::isfinite(number)) return std::nullopt;
   return number;
+}
+
+// Well-formed UTF-8 (RFC 3629: no overlong forms, no surrogates, nothing over U+10FFFF).
+[[nodiscard]] inline bool is_utf8(std::string_view text) noexcept {
+  using namespace boost::locale::utf;
+  for (auto at = text.begin(); at != text.end();)
+    if (!is_valid_codepoint(utf_traits<char>::decode(at, text.end()))) return false;
+  return true;
 }
 
 // For a URI: all but RFC 3986's unreserved characters as %XX.

@@ -4,7 +4,6 @@
 
 #include <boost/xpressive/xpressive_dynamic.hpp>
 #include <chrono>
-#include <string>
 
 namespace joulecast {
 

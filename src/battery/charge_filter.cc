@@ -1,6 +1,5 @@
 #include "battery/charge_filter.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -8,11 +8,9 @@
 #include <utility>
 #include <vector>
 
-// A member, or a member of a member, as a function of an object: AT(record.id).
-#define AT(path)              \
-  [](auto& object) -> auto& { \
-    return object.path;       \
-  }
+// A member, a member of a member, or the result of a function of one, as a function of an object:
+// AT(record.id).
+#define AT(path) [](auto& object) -> decltype(auto) { return (object.path); }
 
 // Parts of JSON Schemas (2020-12), with the order of their members kept.
 namespace joulecast::described {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/json_writer.h"
-#include "base/utf8.h"
+#include "base/text.h"
 #include "describe/schema.h"
 
 namespace joulecast::described {
@@ -76,13 +76,22 @@ class Table {
     return add(utime_us, with_words(of_type("integer", or_null), words),
                [name, get](JsonWriter& out, const T& object) { out.time(name, std::invoke(get, object)); });
   }
-  // The name of a value of an enumeration, one of `names`, null where it is an empty optional.
+  // The name of a value of an enumeration, one of `names`, which are in its order if `get` returns the value
+  // itself; null where it is an empty optional.
   template <class Get, class Names>
   Table& word(std::string name, Get get, const Names& names, std::string_view words) {
     Schema all = Schema::array();
     for (const std::string_view each : names) all.push_back(each);
-    if (is_optional<Of<Get>>) all.push_back(nullptr);
-    return value(std::move(name), get, words, {{"enum", std::move(all)}});
+    if constexpr (std::is_enum_v<Of<Get>>) {
+      const auto name_of =
+          [get, named = std::vector<std::string_view>(std::begin(names), std::end(names))](const T& object) {
+            return named.at(static_cast<std::size_t>(std::invoke(get, object)));
+          };
+      return value(std::move(name), name_of, words, {{"enum", std::move(all)}});
+    } else {
+      if (is_optional<Of<Get>>) all.push_back(nullptr);
+      return value(std::move(name), get, words, {{"enum", std::move(all)}});
+    }
   }
   // An array of a fixed number of doubles, null where it is an empty optional.
   template <class Get>

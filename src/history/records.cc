@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/json_number.h"
+
 namespace joulecast::history {
 
 MissionFindings findings_of(const Mission& mission) {
@@ -25,7 +27,7 @@ std::string annulled_findings(const Mission& mission, std::int64_t utime_us, con
   nlohmann::json all = nlohmann::json::parse(mission.findings_json, nullptr, false);
   if (!all.is_object()) all = nlohmann::json::object();
   all["annulled"] = {{"utime_us", utime_us}, {"reason", reason}};
-  return all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(all);
 }
 
 }  // namespace joulecast::history

@@ -2,21 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "access/sha256.h"
+#include "base/json_number.h"
 #include "history/schema.h"
 
 namespace joulecast::history {
 namespace {
 
 using nlohmann::json;
-
-// A stray byte in a text must not throw.
-std::string text_of(const json& value) {
-  return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
 
 // False if the text is not the JSON of such a value, or one of its elements is not valid.
 template <class T, class Valid>
@@ -49,22 +44,22 @@ void bind_value(Rows& rows, const std::string& text, AsBytes) {
 }
 
 void bind_value(Rows& rows, const std::map<std::string, std::int64_t>& counts) {
-  rows.bind(text_of(counts));
+  rows.bind(json_text(json(counts)));
 }
 
 void bind_value(Rows& rows, const std::vector<CovariateSummary>& covariates) {
   json all = json::array();
   for (const CovariateSummary& c : covariates)
     all.push_back({c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us});
-  all.empty() ? rows.bind_null() : rows.bind(text_of(all));
+  all.empty() ? rows.bind_null() : rows.bind(json_text(all));
 }
 
 void bind_value(Rows& rows, const std::vector<MissionKey>& keys) {
-  rows.bind(text_of(keys));
+  rows.bind(json_text(json(keys)));
 }
 
 void bind_value(Rows& rows, const std::vector<std::array<double, 2>>& places) {
-  rows.bind(text_of(places));
+  rows.bind(json_text(json(places)));
 }
 
 bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts) {

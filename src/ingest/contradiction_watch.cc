@@ -8,7 +8,6 @@
 
 #include "plausibility/check.h"
 #include "telemetry/impossible.h"
-#include "telemetry/slow_stream.h"
 
 namespace joulecast::ingest {
 namespace {

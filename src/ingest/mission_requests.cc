@@ -19,7 +19,7 @@ std::string mission_requests_json(std::span<const MissionRequest> requests) {
                    {"phase", static_cast<int>(event.phase)},
                    {"payload_kg", json_number(event.payload_kg)},
                    {"note", event.note}});
-  return all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return json_text(all);
 }
 
 Result<std::vector<MissionRequest>> stored_mission_requests(const history::Store& store,

@@ -113,7 +113,7 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
     Json event = payload;
     event["mission"] = mission.key;
     event["mission_id"] = mission.mission_id;
-    out.payload_event_json = event.dump(-1, ' ', false, Json::error_handler_t::replace);
+    out.payload_event_json = json_text(event);
   }
   out.payload_unit = payload_unit(line);
   return out;

@@ -9,15 +9,13 @@
 
 #include "base/json_number.h"
 #include "base/utc_time.h"
-#include "telemetry/impossible.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::ingest {
 namespace {
 
-constexpr std::int64_t clock_ahead_us = 10'000'000;     // more than transport and drift can cause
-constexpr std::int64_t clock_tolerance_us = 1'000'000;  // of steered clocks
-constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
+constexpr std::int64_t clock_ahead_us = 10'000'000;      // more than transport and drift can cause
+constexpr std::int64_t clock_tolerance_us = 1'000'000;   // of steered clocks
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
 constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to train on it
@@ -235,8 +233,7 @@ void RobotSession::tell_contradictions(std::int64_t now) {
       nlohmann::json detail = json_of(c);
       detail["mission"] =
           open_ != nullptr && open_->record.key > 0 ? nlohmann::json(open_->record.key) : nullptr;
-      outputs_.post(history::AppendEvent{
-          {0, now, robot_id_, "contradiction", detail.dump(-1, ' ', false, json_replace)}});
+      outputs_.post(history::AppendEvent{{0, now, robot_id_, "contradiction", json_text(detail)}});
     }
     c.told_utime_us = told->second;
   }
@@ -454,8 +451,7 @@ bool RobotSession::teaches(const std::vector<Contradiction>& found) {
   ++snapshot_.missions_left_out[std::string(left_out_names[why])];
   outputs_.counters.missions_left_out[why].fetch_add(1, std::memory_order_relaxed);
   if (!untrue.empty()) {
-    record.findings_json =
-        nlohmann::json{{"contradictions", std::move(untrue)}}.dump(-1, ' ', false, json_replace);
+    record.findings_json = json_text(nlohmann::json{{"contradictions", std::move(untrue)}});
   }
   return false;
 }

@@ -3,10 +3,8 @@
 #include <fmt/format.h>
 
 #include <system_error>
-#include <utility>
 
 #include "telemetry/codec.h"
-#include "telemetry/signature.h"
 
 namespace joulecast::ingest {
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <boost/endian/conversion.hpp>
+#include <iterator>
 #include <joulecast/energy_state_t.hpp>
 #include <joulecast/mission_event_t.hpp>
 #include <joulecast/robot_covariates_t.hpp>
@@ -10,12 +11,21 @@
 #include <joulecast/signed_message_t.hpp>
 #include <utility>
 
+#include "access/sha256.h"
+#include "base/text.h"
 #include "base/try.h"
-#include "base/utf8.h"
 #include "telemetry/datagram.h"
 
 namespace joulecast::telemetry {
 namespace {
+
+// In the order of Subject.
+constexpr std::string_view prefixes[] = {"ROBOT_TELEMETRY.", "MISSION_EVENT.", "ROBOT_COVARIATES.",
+                                         "ENERGY_STATE."};
+
+std::string_view prefix_of(Subject subject) noexcept {
+  return prefixes[static_cast<std::size_t>(subject)];
+}
 
 enum class Text { id, optional_id, note, covariate_name };
 
@@ -193,10 +203,46 @@ void visit_energy_state(Message& m, State& s, Visit visit) {
   }
 }
 
+std::array<std::uint8_t, 32> mac_of(std::string_view channel, const SignedMessage& message,
+                                    std::string_view key) {
+  std::string text;
+  text.reserve(channel.size() + 17 + message.content.size());
+  text.append(channel).push_back('\0');
+  for (const std::int64_t number : {message.utime_us, message.sequence})
+    for (int shift = 56; shift >= 0; shift -= 8)
+      text.push_back(static_cast<char>(static_cast<std::uint64_t>(number) >> shift & 0xff));
+  text.append(reinterpret_cast<const char*>(message.content.data()), message.content.size());
+  return access::hmac_sha256(key, text);
+}
+
+std::string_view text_of(const std::array<std::uint8_t, 32>& mac) {
+  return {reinterpret_cast<const char*>(mac.data()), mac.size()};
+}
+
 constexpr std::size_t real = sizeof(double);
 constexpr std::size_t max_covariate_text = 2 * signals::max_covariate_name_length + 1;  // name, '=', label
 
 }  // namespace
+
+std::string channel_of(Subject subject, std::string_view robot_id) {
+  return std::string(prefix_of(subject)).append(robot_id);
+}
+
+std::optional<ChannelName> parse_channel(std::string_view channel) noexcept {
+  for (std::size_t k = 0; k < std::size(prefixes); ++k) {
+    if (!channel.starts_with(prefixes[k])) continue;
+    const std::string_view robot_id = channel.substr(prefixes[k].size());
+    if (!signals::is_valid_robot_id(robot_id)) return std::nullopt;
+    return ChannelName{static_cast<Subject>(k), robot_id};
+  }
+  return std::nullopt;
+}
+
+std::string channel_pattern(Subject subject) {
+  std::string pattern(prefix_of(subject));
+  return pattern.insert(pattern.size() - 1, "\\") +
+         ".+";  // of the prefix only the last character, a '.', is special
+}
 
 bool is_signed(std::span<const std::uint8_t> bytes) {
   static const std::int64_t fingerprint = signed_message_t::getHash();
@@ -229,6 +275,16 @@ Result<std::vector<std::uint8_t>> encode_signed(const SignedMessage& message) {
   out.content.assign(message.content.begin(), message.content.end());
   std::ranges::copy(message.mac, out.mac);
   return encode(out);
+}
+
+Result<std::vector<std::uint8_t>> sign(std::string_view channel, SignedMessage message,
+                                       std::string_view key) {
+  message.mac = mac_of(channel, message, key);
+  return encode_signed(message);
+}
+
+bool is_authentic(std::string_view channel, const SignedMessage& message, std::string_view key) {
+  return access::equal_in_constant_time(text_of(mac_of(channel, message, key)), text_of(message.mac));
 }
 
 Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {

@@ -63,10 +63,19 @@ struct SignedMessage {
 };
 
 [[nodiscard]] bool is_signed(std::span<const std::uint8_t> bytes);
-// Points into `bytes`. The decoders above accept signed messages and decode their content; signature.h checks
-// the signature.
+// Points into `bytes`. The decoders above accept signed messages and decode their content; is_authentic()
+// checks the signature.
 [[nodiscard]] Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_signed(const SignedMessage& message);
+
+// Proof of a message's sender: HMAC-SHA-256 under the robot's key, as specified in signed_message_t.lcm.
+
+// The bytes of the message signed for that channel; its previous `mac` is ignored.
+[[nodiscard]] Result<std::vector<std::uint8_t>> sign(std::string_view channel, SignedMessage message,
+                                                     std::string_view key);
+
+// Whether the message was signed for that channel with that key.
+[[nodiscard]] bool is_authentic(std::string_view channel, const SignedMessage& message, std::string_view key);
 
 // The content and the robot of a channel of the contract.
 enum class Subject { telemetry, mission_event, covariates, energy_state };

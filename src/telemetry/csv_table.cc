@@ -9,7 +9,6 @@
 
 #include "base/text.h"
 #include "base/try.h"
-#include "base/utf8.h"
 
 namespace joulecast::telemetry {
 namespace {

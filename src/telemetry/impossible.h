@@ -23,6 +23,9 @@ inline constexpr double least_voltage_share = 0.6, greatest_voltage_share = 1.5;
 // stay far below.
 inline constexpr double mistaken_share = 0.2;
 
+// A sentence on telemetry at a rate that is too low for accounts of currents; empty at others.
+[[nodiscard]] std::string slow_stream(double rate_hz);
+
 // Readings that one robot cannot have, found sample by sample in the order of time from the past samples
 // alone, with constant memory.
 class ImpossibleReadings {

@@ -9,7 +9,6 @@
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
-#include "telemetry/signature.h"
 #include "telemetry/validation.h"
 
 namespace t = joulecast::telemetry;

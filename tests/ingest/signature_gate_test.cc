@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "base/text_file.h"
-#include "telemetry/signature.h"
+#include "telemetry/codec.h"
 
 namespace joulecast::ingest {
 namespace {

@@ -12,7 +12,6 @@
 #include <string>
 
 #include "base/text.h"
-#include "server/http/cors.h"
 #include "server/http/router.h"
 #include "server/http/text.h"
 

@@ -1,5 +1,3 @@
-#include "telemetry/signature.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 
 #include "access/sha256.h"
 #include "samples.h"
+#include "telemetry/codec.h"
 
 namespace joulecast::telemetry {
 namespace {
