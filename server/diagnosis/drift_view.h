@@ -65,7 +65,7 @@ struct Parts {
   ingest::ModelRegistry& models;
   const DriftView& drift;
   std::function<std::int64_t()> now_utime_us;
-  std::function<void(const Error&)> on_error = {};
+  std::function<void(const Error&)> on_error = [](const Error&) {};
 };
 
 }  // namespace joulecast::server

@@ -256,7 +256,9 @@ const described::Input<ProfileInput, PathContext>& profile_input() {
           .boolean("columns", &ProfileInput::columns,
                    "false leaves the profile out; a motion of more than 500000 rows is refused", true)
           .boolean("baseline_columns", &ProfileInput::baseline_columns,
-                   "true gives the trapezoid's and the triangle's motion over time too", false)
+                   "true gives the trapezoid's and the triangle's motion over time too, and how they are "
+                   "slowed to the limits",
+                   false)
           .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
                    "points of the front of energy against time", 0);
   return input;

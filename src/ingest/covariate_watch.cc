@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "telemetry/recording_climb.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::ingest {
@@ -99,7 +98,7 @@ double CovariateWatch::climb_at(const dynamics::Parameters<double>& parameters, 
                                 signals::Step step) {
   for (; !heights_.empty() && heights_.front().first <= sample.utime_us; heights_.pop_front())
     height_m_ = heights_.front().second;
-  return climb_.add(telemetry::climb_reading(parameters, sample, height_m_, step));
+  return climb_.add(reader_.at(parameters, sample, height_m_, step));
 }
 
 }  // namespace joulecast::ingest

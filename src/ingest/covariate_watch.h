@@ -16,6 +16,7 @@
 #include "signals/gaps.h"
 #include "signals/sample.h"
 #include "telemetry/covariate_tracker.h"
+#include "telemetry/recording_climb.h"
 
 namespace joulecast::ingest {
 
@@ -58,6 +59,7 @@ class CovariateWatch {
   bool in_mission_ = false;
   std::vector<history::CovariateSummary> summaries_;  // of the open mission
   std::vector<signals::CovariateChange> pending_;
+  telemetry::ClimbReader reader_;
   dynamics::ClimbTracker climb_;
   std::deque<std::pair<std::int64_t, double>> heights_;  // of times that no sample has reached
   double height_m_ = signals::unmeasured;

@@ -1,6 +1,7 @@
 #include "signals/gaps.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace joulecast::signals {
 namespace {
@@ -13,6 +14,14 @@ double seconds(std::int64_t from_us, std::int64_t to_us) {
 
 double longest_bridged_s(double period_s, double bound_s) {
   return std::min(bound_s, std::max(always_bridged_s, bridged_periods * period_s));
+}
+
+double HeldReading::take(std::int64_t utime_us, double value) {
+  const double since_s = seconds(last_utime_us_, utime_us);
+  if (!std::isfinite(value)) return since_s >= 0 && since_s <= longest_bridged_s(period_s_) ? last_ : value;
+  if (std::isfinite(last_) && since_s > 0) period_s_ = since_s;
+  last_utime_us_ = utime_us;
+  return last_ = value;
 }
 
 std::vector<Step> steps_of(std::span<const Sample> samples, double bound_s) {

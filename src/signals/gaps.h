@@ -33,6 +33,18 @@ inline constexpr double usual_bound_s = 30;
 // The longest step that is bridged in a stream of this sample period [s].
 double longest_bridged_s(double period_s, double bound_s = usual_bound_s);
 
+// A quantity that is read less often than samples come: its last reading, as long as a step of the period of
+// its readings is bridged.
+class HeldReading {
+ public:
+  // The value at that time, of which NaN is no reading.
+  double take(std::int64_t utime_us, double value);
+
+ private:
+  double last_ = unmeasured, period_s_ = 0;
+  std::int64_t last_utime_us_ = 0;
+};
+
 enum class Step {
   first,  // of a stream: there is no sample before
   bridged,

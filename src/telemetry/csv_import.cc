@@ -29,6 +29,8 @@ struct Column {
   ValueLimits limits = {};
   CellPlace place = {};
   double value = signals::unmeasured;
+  bool of_covariates = false;  // alone
+  signals::HeldReading held = {};
   bool overflows = false;         // declared or noted
   std::size_t joined = SIZE_MAX;  // the table in which it is; SIZE_MAX: the main one
   struct Reading {
@@ -286,8 +288,10 @@ class Importer {
       TRY_ASSIGN(const auto place, table_.find(column));
       required_.push_back(place);
     }
-    for (auto* targets : {&mapping_.targets, &mapping_.covariates})
-      for (ImportTarget& target : *targets) TRY(bind(target.expression));
+    for (ImportTarget& target : mapping_.targets) TRY(bind(target.expression));
+    const std::size_t of_targets = columns_.size();
+    for (ImportTarget& target : mapping_.covariates) TRY(bind(target.expression));
+    for (Column& column : std::span(columns_).subspan(of_targets)) column.of_covariates = true;
     for (const auto& [column, limits] : mapping_.column_limits)
       if (std::ranges::find(columns_, column, &Column::name) == columns_.end())
         return invalid("/column_limits/" + column, "no field and no covariate uses this column");
@@ -435,14 +439,15 @@ class Importer {
             table_.line(), column.name, leap, range));
   }
 
-  Result<void> take_cells() {
+  Result<void> take_cells(std::int64_t utime_us) {
     for (Column& column : columns_) {
       if (column.joined != SIZE_MAX) continue;
       TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
       if (!value && mapping_.hold_empty_cells) {
         open_.report.cells_filled += !std::isnan(column.value);
       } else if (!value) {
-        column.value = signals::unmeasured;
+        column.value =
+            column.of_covariates ? column.held.take(utime_us, signals::unmeasured) : signals::unmeasured;
       } else {
         repeats_ = repeats_ || *value == column.value;
         note_overflow(column, *value);
@@ -450,6 +455,7 @@ class Importer {
           column.value = *value;
         else if (!column.limits.holds)
           column.value = signals::unmeasured;
+        column.held.take(utime_us, column.value);
       }
     }
     return {};
@@ -547,7 +553,7 @@ class Importer {
         return table_.refuse(column, text, "where this mapping requires '" + wanted + "'");
     TRY(take_part(row));
     TRY_ASSIGN(auto utime_us, time_of(row));
-    if (auto taken = take_cells(); !taken) {
+    if (auto taken = take_cells(utime_us); !taken) {
       if (table_.pass_damaged(true)) return {};
       return taken;
     }

@@ -9,10 +9,16 @@
 
 namespace joulecast::telemetry {
 
-// A sample as dynamics/climb.h reads it, on a robot of these parameters.
-[[nodiscard]] dynamics::ClimbReading climb_reading(const dynamics::Parameters<double>& parameters,
-                                                   const signals::Sample& sample, double height_m,
-                                                   signals::Step step);
+// Samples in order of time as dynamics/climb.h reads them, on a robot of these parameters. Pitch that is
+// measured less often than samples come is held between gaps.
+class ClimbReader {
+ public:
+  dynamics::ClimbReading at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample,
+                            double height_m, signals::Step step);
+
+ private:
+  signals::HeldReading pitch_;
+};
 
 // The climb at each sample of a recording (dynamics::climb_along): from its pitch, else from its covariate
 // height_m.

@@ -266,6 +266,19 @@ const signals::CovariateSeries& series_called(const Recording& recording, const 
   return found == nullptr ? none : *found;
 }
 
+// A height every 2 s, and none after 4 s: held for ten of its periods.
+TEST(CsvImport, HoldsSlowCovariates) {
+  std::string csv = "t,r,l,z\n";
+  for (int k = 0; k < 40; ++k)
+    csv += fmt::format("{},1,1,{}\n", k, k % 2 == 0 && k <= 4 ? fmt::to_string(k) : "");
+  const auto import = import_csv(
+      csv, mapping_of(R"("empty_cells": "unmeasured", "covariates": {"height_m": {"column": "z"}}, )"));
+  ASSERT_TRUE(import) << describe(import.error());
+  const signals::CovariateSeries& height = series_called(import->recording, "height_m");
+  EXPECT_THAT(height.value, ::testing::ElementsAre(0, 2, 4, ::testing::IsNan()));
+  EXPECT_THAT(height.utime_us, ::testing::ElementsAre(0, 2'000'000, 4'000'000, 25'000'000));
+}
+
 TEST(CsvImport, WritesCovariatesOnChange) {
   const std::string csv =
       "t,r,l,load,z\n0,1,1,,7\n1,1,1,50,7\n2,1,1,50,7.5\n3,1,1,nan,7.5\n4,1,1,75,\n5,1,1,75,9\n";

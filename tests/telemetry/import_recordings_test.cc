@@ -269,6 +269,29 @@ TEST(ImportMotives, ClimbFollowsElevationWithoutSpikes) {
   }
 }
 
+// Of ten rows a second, three have a pitch; a gap of 40 s ends with none.
+TEST(RecordingClimb, HoldsSlowPitch) {
+  Recording recording;
+  for (int k = 0; k < 200; ++k) {
+    signals::Sample& sample = recording.samples.emplace_back();
+    sample.utime_us = 100'000 * k + (k < 100 ? 0 : 40'000'000);
+    sample.sequence = k;
+    sample.wheel_velocity_rad_s = {2, 2};
+    sample.pitch_rad = k % 3 == 0 ? 0.05 : std::nan("");
+  }
+  const auto climb = climb_of(recording, wheels_of(0.5));
+  ClimbReader reader;
+  dynamics::ClimbTracker online;
+  for (std::size_t k = 0; k < 200; ++k) {
+    const auto step = k == 0 || k == 100 ? signals::Step::gap : signals::Step::bridged;
+    const double now = online.add(reader.at(wheels_of(0.5), recording.samples[k], std::nan(""), step));
+    const bool known = k != 100 && k != 101;
+    EXPECT_EQ(std::isfinite(climb[k]), known) << k;
+    EXPECT_EQ(std::isfinite(now), known) << k;
+    if (known) EXPECT_EQ(std::pair(climb[k], now), std::pair(0.05, 0.05)) << k;
+  }
+}
+
 TEST(ImportMotives, DynamometerIsFlat) {
   const fs::path path = real_data / "motives_bev/lab/CLTC_CSS__06_CS_20_1.csv.gz";
   JOULECAST_NEED_SHARED(fs::exists(path), "motives_bev recordings");

@@ -154,7 +154,8 @@ export function FloorView({ viewFor, draw, under = drawGrid, onPlace, height, ch
     return () => observer.disconnect();
   }, [height]);
   useEffect(() => latest.current(), [dark, ...changes]);
-  const point = (event) => onPlace?.(...view.current.from(...placeIn(event)), view.current, event);
+  const point = (event) =>
+    view.current && onPlace?.(...view.current.from(...placeIn(event)), view.current, event);
   return (
     <div class="floor-box">
       <canvas

@@ -98,7 +98,7 @@ struct FloorResistanceZone {
       std::to_array<EffectParameter>({{"coefficient", "1", 0, 0, 0.5, "extra rolling resistance inside"},
                                       {"x_m", "m", 0, -1000, 1000, "centre"},
                                       {"y_m", "m", 0, -1000, 1000, "centre"},
-                                      {"radius_m", "m", 3, 0.2, 100, "radius"}});
+                                      {"radius_m", "m", 3, 0.2, 1000, "radius"}});
   static constexpr EffectInfo info{
       "floor_resistance_zone",
       ActsOn::wheel_torque,

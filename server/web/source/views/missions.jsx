@@ -11,7 +11,6 @@ import { Answer, Button, Empty, Failure, Ratio, Readouts } from '../widgets.jsx'
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, exportMissions } from './export.jsx';
 
-// Missions as rows, here and on a robot's page.
 // The states of missions, in the service's words.
 const missionStates = {
   open: 'not ended yet',
