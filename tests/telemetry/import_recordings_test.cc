@@ -288,7 +288,9 @@ TEST(RecordingClimb, HoldsSlowPitch) {
     const bool known = k != 100 && k != 101;
     EXPECT_EQ(std::isfinite(climb[k]), known) << k;
     EXPECT_EQ(std::isfinite(now), known) << k;
-    if (known) EXPECT_EQ(std::pair(climb[k], now), std::pair(0.05, 0.05)) << k;
+    if (known) {
+      EXPECT_EQ(std::pair(climb[k], now), std::pair(0.05, 0.05)) << k;
+    }
   }
 }
 
