@@ -14,6 +14,7 @@
 #include "base/median.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "signals/gaps.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/import_table.h"
