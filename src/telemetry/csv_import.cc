@@ -30,10 +30,9 @@ struct Column {
   ValueLimits limits = {};
   CellPlace place = {};
   double value = signals::unmeasured;
-  bool of_covariates = false;  // alone
-  signals::HeldReading held = {};
-  bool overflows = false;         // declared or noted
-  std::size_t joined = SIZE_MAX;  // the table in which it is; SIZE_MAX: the main one
+  std::optional<signals::HeldReading> held = {};  // of covariates alone
+  bool overflows = false;                         // declared or noted
+  std::size_t joined = SIZE_MAX;                  // the table in which it is; SIZE_MAX: the main one
   struct Reading {
     std::int64_t utime_us = 0;
     double value = 0;
@@ -292,7 +291,7 @@ class Importer {
     for (ImportTarget& target : mapping_.targets) TRY(bind(target.expression));
     const std::size_t of_targets = columns_.size();
     for (ImportTarget& target : mapping_.covariates) TRY(bind(target.expression));
-    for (Column& column : std::span(columns_).subspan(of_targets)) column.of_covariates = true;
+    for (Column& column : std::span(columns_).subspan(of_targets)) column.held.emplace();
     for (const auto& [column, limits] : mapping_.column_limits)
       if (std::ranges::find(columns_, column, &Column::name) == columns_.end())
         return invalid("/column_limits/" + column, "no field and no covariate uses this column");
@@ -447,8 +446,7 @@ class Importer {
       if (!value && mapping_.hold_empty_cells) {
         open_.report.cells_filled += !std::isnan(column.value);
       } else if (!value) {
-        column.value =
-            column.of_covariates ? column.held.take(utime_us, signals::unmeasured) : signals::unmeasured;
+        column.value = column.held ? column.held->take(utime_us, signals::unmeasured) : signals::unmeasured;
       } else {
         repeats_ = repeats_ || *value == column.value;
         note_overflow(column, *value);
@@ -456,7 +454,7 @@ class Importer {
           column.value = *value;
         else if (!column.limits.holds)
           column.value = signals::unmeasured;
-        column.held.take(utime_us, column.value);
+        if (column.held) column.held->take(utime_us, column.value);
       }
     }
     return {};
