@@ -102,7 +102,7 @@ try {
   await page.getByRole('row', { name: /carol.*127\.0\.0\.1.*store the robot file: amr.*403/ }).waitFor();
   await page.screenshot({ path: path.join(given.out, 'requests.png') });
   await page.getByRole('button', { name: 'Robots and models' }).click();
-  await page.getByText('Nothing has happened yet').waitFor();
+  await page.getByText('No events yet').waitFor();
   console.log('the page signs in, signs out on revocation, and shows the audit log to an admin');
 } finally {
   await browser.close();

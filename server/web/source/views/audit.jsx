@@ -209,8 +209,8 @@ function RobotEvents({ given: { robot }, change }) {
       of={events}
       fields={fields}
       what="the log"
-      none="Nothing has happened yet"
-      more="Adoptions, drifts and diagnoses are listed here."
+      none="No events yet"
+      more="Adoptions, drifts with their diagnoses, silence and contradictory telemetry are listed here."
       from={({ entries }) => entries}
     >
       {(list) => <Events events={list} />}

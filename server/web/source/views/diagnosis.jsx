@@ -450,7 +450,9 @@ function Verdict({ result: r }) {
         {effects && `${r.verdict === 'effects' ? ':' : '; most likely'} ${effects}`}
       </p>
       <p class="note">
-        {verdictNotes[r.verdict]} Probability of this verdict: {chance(r.verdict_probability)}.
+        {verdictNotes[r.verdict]}
+        {!['inconclusive', 'not_this_robot'].includes(r.verdict) &&
+          ` Probability of this verdict: ${chance(r.verdict_probability)}.`}
       </p>
       <Texts of={r.reasons} />
     </div>

@@ -159,8 +159,8 @@ function Footnote({ mission, request, payloads, version }) {
       {format.count(legs, 'leg')} between stops, {format.text(format.length(mission.energy.distance_m))} in
       all, {format.fixed(format.degrees(sum('angle_rad')))}° turned at the stops,
       {stoodS > 0 ? ` ${format.span(stoodS)} at rest as in the mission,` : ''}{' '}
-      {carriedNote(mission, payloads)}, arriving no later. Both energies are computed with model version{' '}
-      {version}, that of the mission.
+      {carriedNote(mission, payloads)}, arriving no later. Modelled and least energy are computed with the
+      model version of the mission, {version}.
     </p>
   );
 }

@@ -148,7 +148,7 @@ function RecentEvents({ id }) {
   const events = useEvents(id, recentEvents);
   return (
     <Panel title="Log" aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}>
-      <List of={events} what="the log" from={({ entries }) => entries} none="Nothing has happened yet">
+      <List of={events} what="the log" from={({ entries }) => entries} none="No events yet">
         {(rows) => <Events events={rows} withRobot={false} />}
       </List>
     </Panel>
