@@ -353,7 +353,7 @@ class Bags(unittest.TestCase):
 
     def test_mapping_mistakes_are_named(self):
         path, mapping = self.mcap(Drive(self.samples).all()), self.place / "mapping.json"
-        for wrong, part in (({"topic": {}}, "'topic' is none of"), ({"topics": {"wheel": "/a"}}, "'wheel' is none of"),
+        for wrong, part in (({"topic": {}}, "unknown member 'topic'"), ({"topics": {"wheel": "/a"}}, "'wheel' is none of"),
                             ({"topics": {"battery": "/bms"}}, "there are /battery_state"),
                             ({"battery_current": "reversed"}, "positive_discharging")):
             mapping.write_text(json.dumps(wrong))
@@ -362,7 +362,7 @@ class Bags(unittest.TestCase):
     def test_check_reads_mappings(self):
         mapping = self.place / "mapping.json"
         for members, code, part in (({"topics": {"battery": "/bms", "pose": None}, "robot_id": "amr"}, 0, "no problems found"),
-                                    ({"topics": {"wheel": "/a"}}, 1, "'wheel' is none of"), ({"joints": {}, "topic": {}}, 1, "'topic' is none of"),
+                                    ({"topics": {"wheel": "/a"}}, 1, "'wheel' is none of"), ({"joints": {}, "topic": {}}, 1, "unknown member 'topic'"),
                                     ({"battery_current": "reversed"}, 1, "positive_discharging")):
             mapping.write_text(json.dumps(members))
             text = run(CLIENT, "check", mapping, code=code)

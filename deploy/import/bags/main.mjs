@@ -57,6 +57,8 @@ async function main() {
   if (process.argv[2] === '--licences') return process.stdout.write(LICENCES);
   const request = JSON.parse(process.argv[2]);
   const answer = await convert(request).catch(({ option, message }) => ({ field: option, message }));
+  // Of a failed call of the system.
+  answer.message = answer.message?.replace(/E[A-Z]+: (.*), \w+ '.*'$/, 'cannot be opened: $1');
   await writeFile(path.join(request.out, 'answer.json'), JSON.stringify(answer));
 }
 main();

@@ -82,7 +82,8 @@ export class Recording {
   // `choices` is the file of --mapping, `robot` that of --robot, both parsed or {}.
   constructor(choices, robot) {
     const unknown = Object.keys(choices).filter((name) => !settings.includes(name));
-    if (unknown.length) throw wrong(`'${unknown[0]}' is none of ${list(settings)}`);
+    if (unknown.length)
+      throw wrong(`unknown member '${unknown[0]}'; a mapping of bags has ${list(settings)}`);
     const roles = Object.keys(choices.topics ?? {}).filter((role) => !(role in preferences));
     if (roles.length) throw wrong(`topics: '${roles[0]}' is none of ${list(Object.keys(preferences))}`);
     if (!['positive_charging', 'positive_discharging', undefined].includes(choices.battery_current))
