@@ -142,7 +142,7 @@ function Saving({ share }) {
   if (share > 0.005)
     return (
       <>
-        The same legs could have been driven for <b>{format.share(share, 1)}</b> less.
+        The least energy for these legs is <b>{format.share(share, 1)}</b> below the modelled.
       </>
     );
   return share > -0.005
