@@ -264,7 +264,7 @@ Result<Exit> run_autonomy(AskOptions& options) {
   const bool charged =
       std::ranges::find(options.given, "state_of_charge", &Given::member) != options.given.end();
   if (options.request_file.empty() && options.server.empty() && !options.robot_file.empty() && !charged)
-    throw CLI::RequiredError("--charge, which is not in a robot file,");
+    throw CLI::RequiredError("with --robot, --charge");
   return run_ask(options, autonomy);
 }
 

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -102,7 +103,9 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   // Telemetry between missions is used only if the robot declares no missions.
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
-  if (all.empty()) return invalid("log", "contains no telemetry of " + robot_id);
+  if (all.empty())
+    return invalid("log", fmt::format("contains no telemetry of {}{}{}", robot_id,
+                                      log.robots.empty() ? "" : ", only of ", fmt::join(log.robots, ", ")));
   for (telemetry::Recording& r : all) {
     if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
   }
@@ -242,7 +245,9 @@ void print(const energy::PowerCalibration& fit) {
         "The regression predicts better: the power of this robot depends on an effect that its model lacks. "
         "Find it with joulecast gap.\n");
   fmt::print("\nNot identifiable from battery power:\n");
-  for (const energy::Untold& u : fit.untold) fmt::print("- {}: {}.\n", u.what, u.why);
+  for (const energy::Untold& u : fit.untold)
+    if (std::ranges::find(fit.estimates, u.what, &energy::ParameterEstimate::name) == fit.estimates.end())
+      fmt::print("- {}: {}.\n", u.what, u.why);
   fmt::print("\n");
 }
 
@@ -298,15 +303,16 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
                                                error("file_error"),
                                                energy_column("fitted", "calibrated_j", unit),
                                                error("calibrated_error")});
-  double unused = 0, total = 0, missed = 0;
+  std::size_t unused = 0;
+  double total = 0, missed = 0;
   for (const CalibratedMission& c : outcome.missions) {
     if (c.trained_on) continue;
-    unused += 1;
+    ++unused;
     total += c.measured_j;
     missed += std::fabs(c.after_j - c.measured_j);
   }
   if (unused > 0)
-    fmt::print("error on the {:.0f} held-out missions: {:.1f} % of their energy\n", unused,
+    fmt::print("error on the {}: {:.1f} % of their energy\n", count_of(unused, "held-out mission"),
                1e2 * missed / total);
 }
 

@@ -55,6 +55,8 @@ struct Report {
 };
 
 Result<Kind> kind_of(const std::string& path) {
+  if (std::error_code unreadable; std::filesystem::is_directory(path, unreadable))
+    return invalid(path, "is a folder");
   std::ifstream file(path, std::ios::binary);
   if (!file) return fail(Fault::not_found, path, "cannot be opened");
   std::array<unsigned char, 4> first{};
@@ -181,6 +183,8 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
   TRY_ASSIGN(const auto mapping, read_mapping(options.mapping));
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
+  // The date does not matter; missions follow one another, as in an import.
+  how.start_utime_us = telemetry::year_2000_utime_us;
   std::vector<telemetry::Recording> recordings;
   std::map<std::string, std::int64_t> next;
   for (const std::string& table : tables) {
@@ -200,6 +204,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
       number_on(import.recording, next);
       for (const signals::Sample& sample : import.recording.samples)
         report.watch.add(import.recording.robot_id, sample);
+      how.start_utime_us = import.recording.samples.back().utime_us + how.pause_us;
       recordings.push_back(std::move(import.recording));
     }
   }
@@ -290,7 +295,8 @@ void print_check(const Report& report) {
     fmt::print("{}\n", text);
   }
   for (const auto& [channel, tally] : report.watch.channels())
-    fmt::print("{:<32} {:>8} messages, {:.4g} a second\n", channel, tally.messages, tally.rate_hz());
+    fmt::print("{:<32} {:>8} message{}, {:.4g} a second\n", channel, tally.messages,
+               tally.messages == 1 ? "" : "s", tally.rate_hz());
   print(report.findings);
   if (!report.robot && !report.watch.channels().empty())
     fmt::print("units and signs were not checked: that needs --robot FILE\n");

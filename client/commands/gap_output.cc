@@ -300,8 +300,12 @@ void print_diagnosis(const Json& d, const std::string& unit) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  fmt::print("verdict: {} (probability {})\n", text(d.value("verdict_title", d["verdict"])),
-             gap::probability_text(number_or_nan(d["verdict_probability"])));
+  // Of an inconclusive verdict and of another robot it is the probability of the likeliest effect, below.
+  const bool own_probability = d["verdict"] != "inconclusive" && d["verdict"] != "not_this_robot";
+  fmt::print("verdict: {}{}\n", text(d.value("verdict_title", d["verdict"])),
+             own_probability
+                 ? " (probability " + gap::probability_text(number_or_nan(d["verdict_probability"])) + ")"
+                 : "");
   for (const Json& reason : member_at(d, "reasons")) print_item(text(reason));
   for (const Json& e : d["effects"]) print_effect(e);
   print_held_out(d);

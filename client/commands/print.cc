@@ -283,6 +283,7 @@ void print_ledger_terms(const Json& terms_j, double whole_j, const std::string& 
 }
 
 void print_back_test(const Json& test, const std::string& unit) {
+  if (test["missions"].empty()) return;
   const auto percent = [](const char* title, const char* member) { return Column{title, member, 2, 100}; };
   print_rows(test["missions"], {{"tested on mission", "mission_id"},
                                 energy_column("measured", "measured_j", unit),

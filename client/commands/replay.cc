@@ -165,7 +165,10 @@ std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::stri
 // Runs logs straight through the daemon's ingest pipeline into a history, as fast as it takes them, and
 // prints the missions that came of it. The same logs give the same bits in every account.
 Result<Exit> replay_into(const ReplayOptions& options) {
-  TRY_ASSIGN(const auto store, history::open_store(options.into));
+  TRY_ASSIGN(const auto store, history::open_store(options.into).map_error([](Error error) {
+    error.field = "--into";
+    return error;
+  }));
   ingest::IngestCounters counters;
   history::WriterOptions writing;
   history::Writer* reporter = nullptr;

@@ -115,7 +115,7 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     adoption.note = r.note.value_or(proposal.note);
     fitted_on = std::move(proposal.fitted_on);
     if (const auto moot = moot_of(services, proposal); moot && !r.force)
-      return fail(Fault::conflict, "/proposal_id", *moot + "; set force to adopt it all the same");
+      return fail(Fault::conflict, "/proposal_id", *moot + "; set force to adopt it anyway");
   }
   if (!model) return tl::unexpected(std::move(model.error()));
   if (auto effects = dynamics::active_effects(*model); !effects) {
@@ -128,9 +128,9 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
 }
 
 Response refused(const Request& request, const server::Adoption& adoption) {
-  Response response = http::problem(
-      409, "no-improvement", "Not adopted: " + adoption.refusal + ". To adopt it all the same, set force.",
-      request.id, "/force", adoption.refusal);
+  Response response = http::problem(409, "no-improvement",
+                                    "Not adopted: " + adoption.refusal + ". To adopt it anyway, set force.",
+                                    request.id, "/force", adoption.refusal);
   Json document = Json::parse(response.body);
   document["back_test"] = Json::parse(adoption.back_test_json);
   response.body = document.dump();
@@ -194,12 +194,15 @@ Result<Response> post_model(Services& services, const Request& request) {
         {id, adoption.adopted, version, adoption.previous_version, adoption.back_test_json}));
   };
   RequestChange change(services, request);
-  const Result<server::Adoption> adoption = services.adoption.adopt(
+  Result<server::Adoption> adoption = services.adoption.adopt(
       wanted, [&request] { return !request.stop.stop_requested(); },
       [&](const server::Adoption& about_to) {
         return change.answered_by(
             [answer, about_to](std::int64_t version) { return answer(about_to, version); });
       });
+  // The diagnosis expects the version that it is about.
+  if (!adoption && adoption.error().field == "/expected_version" && !read.expected_version)
+    adoption.error().field = "/diagnosis_id";
   if (adoption && !adoption->adopted && !read.dry_run) return refused(request, *adoption);
   if (adoption && !adoption->adopted) return answer(*adoption, adoption->version);
   return change.result(adoption.map(&server::Adoption::version));

@@ -50,7 +50,7 @@ Error as_of_request(Error error, const gap::Offer& offer) {
   if (!error.field.empty()) return error;
   error.field = "/diagnosis_id";
   error.message = "Not adopted: " + error.message + ".";
-  if (!offer.effects.empty()) error.message += " To adopt it all the same, set force.";
+  if (!offer.effects.empty()) error.message += " To adopt it anyway, set force.";
   return error;
 }
 

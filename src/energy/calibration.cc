@@ -208,11 +208,11 @@ class Calibrator {
     }
     std::ranges::copy_if(blocks, std::back_inserter(blocks_), [](const Moments& m) { return !m.isZero(0); });
     if (blocks_.size() >= least_blocks) return {};
-    return invalid("runs", "hold only " + std::to_string(observations_.size() / 2) + " windows of" +
-                               (options_.method == CalibrationMethod::steady ? " steady straight" : "") +
-                               " motion with measured currents, in " + std::to_string(blocks_.size()) +
-                               " of " + std::to_string(blocks.size()) + " parts; " +
-                               std::to_string(least_blocks) + " are needed");
+    return invalid("log", "contains only " + std::to_string(observations_.size() / 2) + " windows of" +
+                              (options_.method == CalibrationMethod::steady ? " steady straight" : "") +
+                              " motion with measured currents, in " + std::to_string(blocks_.size()) +
+                              " of " + std::to_string(blocks.size()) + " parts; " +
+                              std::to_string(least_blocks) + " are needed");
   }
 
   bool usable(const windows::Window& w, double top_rad_s) const {

@@ -252,7 +252,7 @@ Result<PowerFit> fit_power(const PowerParameters& parameters, const PowerWindows
                            const PowerFree& free, const Eigen::VectorXd& start) {
   const Misfit misfit(parameters, data, use);
   if (misfit.rows() == 0)
-    return invalid("runs", "hold no window with battery power in which wheels keep moving or still");
+    return invalid("log", "contains no window with battery power in which wheels keep moving or still");
   const double power_w = scale_of(data.windows).power_w;
   Descent descent(parameters, misfit, free, power_w);
   PowerFit fit{descent.within(start), {}, {}, 1, 0};
@@ -343,7 +343,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
                         seen,
                         std::string(meanings[at])};
     if (known) e.note = "given as known";
-    if (!known && !seen) e.note = "stays near the file's: " + why(parameters, fit, p);
+    if (!known && !seen) e.note = "not identified: " + why(parameters, fit, p);
     if (is_effect(p) && !free[at]) e.note = "not detected";
     estimates.push_back(std::move(e));
   }

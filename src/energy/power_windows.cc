@@ -68,10 +68,10 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   for (const windows::Window& w : p.windows) p.whole.push_back(windows::steady(w));
   const auto whole = static_cast<std::size_t>(std::ranges::count(p.whole, true));
   if (whole < fewest_windows || p.blocks < fewest_blocks)
-    return invalid("runs", "hold only " + std::to_string(whole) + " windows with battery power in " +
-                               std::to_string(p.blocks) + " blocks of 15 s; " +
-                               std::to_string(fewest_windows) + " windows and " +
-                               std::to_string(fewest_blocks) + " blocks are needed");
+    return invalid("log", "contains only " + std::to_string(whole) + " windows with battery power in " +
+                              std::to_string(p.blocks) + " blocks of 15 s; " +
+                              std::to_string(fewest_windows) + " windows and " +
+                              std::to_string(fewest_blocks) + " blocks are needed");
   return p;
 }
 

@@ -134,7 +134,7 @@ void Review::motor() {
       friction_nm / (model_.kinematics.wheel_radius_m * motion_.mass_kg * standard_gravity_m_s2);
   if (coefficient > 0.3)
     warn("/motor/friction_torque_nm", coefficient,
-         "is [{:.4g}, {:.4g}] N m, a drag of {:.3g} of the robot's weight; it applies at the wheel, after "
+         "is [{:.4g}, {:.4g}] N m, a drag of {:.3g} times the robot's weight; it applies at the wheel, after "
          "the gear",
          motor.friction_torque_nm[right], motor.friction_torque_nm[left], coefficient);
 }

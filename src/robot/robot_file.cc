@@ -318,7 +318,7 @@ void check_idle_power(const RobotModel& model, Problems& problems) {
   const double most =
       battery.nominal_voltage_v * battery.nominal_voltage_v / (4 * battery.internal_resistance_ohm);
   if (model.idle_power_w >= most)
-    problems.add("/idle_power_w", fmt::format("is {} W, must be less than what the battery can give, "
+    problems.add("/idle_power_w", fmt::format("is {} W, must be less than the battery's greatest power, "
                                               "nominal_voltage_v²/(4·internal_resistance_ohm) = {} W",
                                               model.idle_power_w, most));
 }

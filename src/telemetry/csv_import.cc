@@ -241,6 +241,11 @@ class Importer {
       notes_.push_back(
           R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
           " holds them between the rows");
+    if (restarts_ > 1)
+      notes_.push_back(
+          fmt::format("line {} is the last of {} at which a mission begins so", last_restart_, restarts_));
+    for (const ImportTarget& target : mapping_.targets)
+      if (has_no_value(target.number)) notes_.push_back("no row has a value of " + target.name);
     first.settings_detected = table_.settings().size();
     for (const auto& notes : {table_.settings(), table_.notes(), notes_})
       first.notes.insert(first.notes.end(), notes.begin(), notes.end());
@@ -534,12 +539,14 @@ class Importer {
     part_ = row.part;
     const double step_s = parts_[part_].step_s;
     if (step_s == 0) return {};
-    notes_.push_back(fmt::format("line {}: the time goes {} by {:.10g} s: a new mission begins{}",
-                                 table_.line(), step_s < 0 ? "back" : "forward", std::abs(step_s),
-                                 step_s > 0 ? ""
-                                 : mapping_.layout.time_unit_ns > 0
-                                     ? R"(; set "wraps_at" for a time that overflows)"
-                                     : R"(; name the zone in "utc_offset" if its clocks change)"));
+    last_restart_ = table_.line();
+    if (restarts_++ == 0)
+      notes_.push_back(fmt::format("line {}: the time goes {} by {:.10g} s: a new mission begins{}",
+                                   last_restart_, step_s < 0 ? "back" : "forward", std::abs(step_s),
+                                   step_s > 0 ? ""
+                                   : mapping_.layout.time_unit_ns > 0
+                                       ? R"(; set "wraps_at" for a time that overflows)"
+                                       : R"(; name the zone in "utc_offset" if its clocks change)"));
     // Rows without a date go on after the mission before.
     if (options_.start_utime_us && last_us > 0 && step_s < 0)
       shift_us_ = last_us + options_.pause_us - row.since_zero_us;
@@ -605,6 +612,14 @@ class Importer {
                             target.name, period));
   }
 
+  bool has_no_value(std::size_t number) {
+    return std::ranges::all_of(result_, [&](Import& one) {
+      return std::ranges::all_of(one.recording.samples, [&](signals::Sample& sample) {
+        return std::isnan(*signals::numbers_of(sample)[number]);
+      });
+    });
+  }
+
   // Computes rates, and drops samples left without motion.
   Result<void> close_mission() {
     std::vector<signals::Sample>& samples = open_.recording.samples;
@@ -664,7 +679,8 @@ class Importer {
   std::optional<std::int64_t> shift_us_;
   bool repeats_ = false;  // a reading that is written is the same as the one before
   std::vector<Part> parts_;
-  std::size_t part_ = 0;  // that the present row belongs to
+  std::size_t part_ = 0;                         // that the present row belongs to
+  std::size_t restarts_ = 0, last_restart_ = 0;  // of the time: their number, and the last one's line
   std::map<std::string, std::size_t> missions_called_;
   std::vector<std::string> notes_;
   Import open_;

@@ -105,6 +105,9 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
   std::vector<std::string_view> names;
   TRY_ASSIGN(auto read, table.read_row(names));
   if (!read) return corrupt(1, "the table is empty; a header is needed");
+  if (std::ranges::any_of(names,
+                          [](std::string_view name) { return name.find('\0') != std::string_view::npos; }))
+    return corrupt(1, "has zero bytes: the file is not text");
   table.header_.assign(names.begin(), names.end());
   return table;
 }

@@ -174,9 +174,8 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
     if (std::isnan(*f.reading)) continue;
     std::string why;
     if (outlies(channel, *f.reading, f.limit))
-      why = fmt::format(
-          "{} is {:.10g}, where all before were within {:.4g} and the robot file gives {:.4g} at most",
-          f.name, *f.reading, channel.largest, f.limit);
+      why = fmt::format("{} is {:.10g}; the largest before was {:.4g}, and the robot file allows {:.4g}",
+                        f.name, *f.reading, channel.largest, f.limit);
     else if (frozen(channel, *f.reading, f.motion, sample.utime_us, counts))
       why = fmt::format(
           "{} is frozen at {:.4g} while the robot moves; before, it repeated a value for {} rows at most",

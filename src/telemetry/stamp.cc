@@ -237,7 +237,9 @@ Result<std::int64_t> StampReader::read(std::string_view text) {
       zone = own->zone_;
       candidates = candidates_of();
     }
-    if (zone == nullptr) return invalid("", "is no time; time/utc_offset is for stamps that name no zone");
+    if (zone == nullptr)
+      return invalid(
+          "", "names no time zone: set \"utc_offset\" of \"time\", such as \"Z\" or \"Europe/Berlin\"");
     const auto& [first, second] = candidates;
     const auto distance = [&](microseconds time) { return std::abs(time.count() - *last_utime_us_); };
     return done((last_utime_us_ && distance(second.utc) < distance(first.utc) ? second : first).utc.count());

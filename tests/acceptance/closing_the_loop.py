@@ -192,6 +192,9 @@ def one_robot(given, draw, number):
         if "back_test" in answer:  # a diagnosis that is not to be adopted is refused before the back-test
             row["back_test"] = [answer["back_test"]["error_before"], answer["back_test"]["error_after"]]
             row["energy_promised"] = answer["back_test"]["improvement_ci"][0] > 0
+        if row["adopted"]:
+            status, answer = ask(programs.url, "POST", f"/v1/robots/{robot['robot_id']}/models", {"diagnosis_id": job["id"]})
+            check((status, answer["field"]) == (409, "/diagnosis_id"), f"adopting again: {status} {answer}")
     _, detail = ask(programs.url, "GET", f"/v1/robots/{robot['robot_id']}")
     check(detail["model_version"] == (2 if row["adopted"] else 1), "the version in force")
     with open(after_file, "w") as file:

@@ -172,6 +172,19 @@ TEST_F(CheckCommand, DetectedSettingsAreNoWarnings) {
   EXPECT_THAT(printed_, HasSubstr("run.csv: table; the separator is ';', the decimal sign ','\n"));
 }
 
+TEST_F(CheckCommand, RestartedTimesAreMissions) {
+  std::string csv = "t,r,l,v,i\n";
+  for (int k = 0; k < 600; ++k) csv += fmt::format("{:.2f},{},1,,nan\n", 0.05 * (k % 200) - 1, k);
+  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}],
+      "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"}}})");
+  EXPECT_EQ(check({file("run.csv", csv), "--mapping", how}), Exit::warned);
+  EXPECT_THAT(printed_, HasSubstr("line 202: the time goes back by 9.95 s: a new mission begins"));
+  EXPECT_THAT(printed_, HasSubstr("line 402 is the last of 2 at which a mission begins so"));
+  EXPECT_THAT(printed_, HasSubstr("no row has a value of battery_voltage"));
+  EXPECT_THAT(printed_, HasSubstr("no row has a value of battery_current"));
+}
+
 TEST_F(CheckCommand, ReportsRowsOutOfOrder) {
   std::string csv = "t,r,l\n";
   for (int k = 0; k < 200; ++k) csv += std::to_string(0.05 * (k ^ 1)) + ",1,1.5\n";

@@ -44,6 +44,15 @@ TEST(GapOutput, OmitsUnknownNoiseFloor) {
   EXPECT_EQ(text.find("power by term"), std::string::npos) << text;
 }
 
+TEST(GapOutput, OmitsProbabilityOfUndecidedVerdict) {
+  gap::Diagnosis d = made_diagnosis();
+  for (const gap::Verdict verdict : {gap::Verdict::inconclusive, gap::Verdict::not_this_robot}) {
+    d.verdict = verdict;
+    EXPECT_THAT(printed(gap::diagnosis_to_json(d)),
+                HasSubstr("verdict: " + std::string(gap::title_of(verdict)) + "\n"));
+  }
+}
+
 TEST(GapOutput, PrintsSectionsInOrder) {
   const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
   std::size_t at = 0;

@@ -60,6 +60,11 @@ TEST(LedgerTerms, PrintRecoveredNegativeWithoutZeros) {
             "  recovered                  -25.00 J   -50.0 %\n");
 }
 
+TEST(BackTest, OmitsFiguresWithoutMissions) {
+  const Json test = {{"missions", Json::array()}, {"error_before", nullptr}, {"improves", false}};
+  EXPECT_EQ(output_of([&] { print_back_test(test, "Wh"); }), "");
+}
+
 TEST(BackTest, PrintsIntervalsOnlyIfPresent) {
   Json test = {{"missions",
                 {{{"mission_id", "m1"},

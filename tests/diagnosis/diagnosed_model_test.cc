@@ -53,7 +53,7 @@ TEST_F(DiagnosedModelTest, KeepsRefusalReasonDespiteForce) {
   const Error error = refused(record_of(d));
   EXPECT_EQ(error.fault, Fault::conflict);
   EXPECT_EQ(error.field, "/diagnosis_id");
-  EXPECT_THAT(error.message, HasSubstr(d.refusal + ". To adopt it all the same, set force."));
+  EXPECT_THAT(error.message, HasSubstr(d.refusal + ". To adopt it anyway, set force."));
   const auto forced = diagnosed_model(*harness_.store, record_of(d), {{}, true});
   ASSERT_TRUE(forced) << describe(forced.error());
   EXPECT_EQ(forced->overridden, d.refusal);

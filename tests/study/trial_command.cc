@@ -95,7 +95,7 @@ Exit run(TrialCommandOptions& options) {
 // The options for kept cases.
 void add_cases(CLI::App& command, CasesOptions& options) {
   auto* cases =
-      command.add_option("--cases", options.cases, "Score an engine on the kept cases of this file")
+      command.add_option("--cases", options.cases, "score an engine on the kept cases of this file")
           ->type_name("FILE");
   const auto add = [&](const char* name, std::string& value, const char* text, const char* type) {
     command.add_option(name, value, text)->type_name(type)->needs(cases);

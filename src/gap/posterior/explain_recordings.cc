@@ -167,10 +167,10 @@ class Explainer {
           fmt::format(
               "the effect {} is not named: its share of the explained gap on held-out data is {:.1f}\u00a0%, "
               "must be {:.0f} to {:.0f}\u00a0%",
-              e.id, 100 * e.share, 100 * least_gap_share, 100 * most_gap_share));
+              words_of(e.id), 100 * e.share, 100 * least_gap_share, 100 * most_gap_share));
     e.at_bound = own.size() == 1 && at_bound(hypothesis, own[0]);
     if (e.group >= named && e.at_bound)
-      withhold(e, fmt::format("the effect {} is not named: its estimate is at its bound", e.id));
+      withhold(e, fmt::format("the effect {} is not named: its estimate is at its bound", words_of(e.id)));
     a_.effects.push_back(std::move(e));
   }
 

@@ -308,8 +308,10 @@ const Table<Diagnosis>& diagnosis_table() {
               "verdict_title", [](const D& d) { return title_of(d.verdict); }, verdict_titles,
               "the verdict in words")
           .later()
-          .number_or_null("verdict_probability", &D::verdict_probability,
-                          "probability of the verdict, averaged over resampled blocks")
+          .number_or_null(
+              "verdict_probability", &D::verdict_probability,
+              "probability of none, effects or outside, averaged over resampled blocks; of the other "
+              "verdicts that of the most probable effect")
           .later()
           .texts("reasons", &D::reasons, "evidence against a stronger verdict")
           .later()

@@ -210,12 +210,13 @@ std::string missing_data(const Diagnosis& d, bool motion_known) {
   if (!motion_known)
     return fmt::format(
         "The recordings have less usable motion of the wheels than the 20 s that a diagnosis needs: they are "
-        "shorter, their checks exclude it, or no wheel turns faster than {} rad/s.",
+        "shorter or have too few readings, their checks exclude it, or no wheel turns faster than {} rad/s.",
         windows::moving_rad_s);
   if (d.power != PowerSource::none) return "There are too few seconds of motion with power.";
   std::string excluded;
   for (const Check& check : d.checks)
-    if ((check.contradicted || check.id == "impossible_readings") && check.channel != "wheel_velocity")
+    if ((check.contradicted || check.id == "impossible_readings") && check.channel != "wheel_velocity" &&
+        excluded.find(check.channel) == std::string::npos)
       excluded += (excluded.empty() ? "" : ", ") + check.channel;
   if (excluded.empty())
     return "Neither power nor the motors' voltage or current was recorded: a diagnosis needs battery_voltage "
