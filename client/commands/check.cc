@@ -183,8 +183,9 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
   TRY_ASSIGN(const auto mapping, read_mapping(options.mapping));
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
-  // The date does not matter; missions follow one another, as in an import.
+  // Dates are not checked. Missions follow each other without a gap.
   how.start_utime_us = telemetry::year_2000_utime_us;
+  how.pause_us = 1'000'000;
   std::vector<telemetry::Recording> recordings;
   std::map<std::string, std::int64_t> next;
   for (const std::string& table : tables) {

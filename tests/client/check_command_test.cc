@@ -181,6 +181,7 @@ TEST_F(CheckCommand, RestartedTimesAreMissions) {
   EXPECT_EQ(check({file("run.csv", csv), "--mapping", how}), Exit::warned);
   EXPECT_THAT(printed_, HasSubstr("line 202: the time goes back by 9.95 s: a new mission begins"));
   EXPECT_THAT(printed_, HasSubstr("line 402 is the last of 2 at which a mission begins so"));
+  EXPECT_THAT(printed_, ::testing::Not(HasSubstr("gap")));
   EXPECT_THAT(printed_, HasSubstr("no row has a value of battery_voltage"));
   EXPECT_THAT(printed_, HasSubstr("no row has a value of battery_current"));
 }

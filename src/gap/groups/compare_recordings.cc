@@ -76,7 +76,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   robot::RobotModel robot = file;
   std::vector<std::size_t> groups = name_groups(group_of_mission, c);
   if (c.groups.size() < 2)
-    return invalid("log", "holds missions of one group only; two are needed to compare");
+    return invalid("log", "contains missions of one group only; a comparison needs two");
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
   checks = check_and_correct(trusted, robot);

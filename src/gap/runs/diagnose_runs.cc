@@ -146,9 +146,8 @@ class RunDiagnoser {
     }
     if (payloads.size() == 2) {
       limits.emplace_back(
-          "Two payloads make a straight line: a third one is needed to test whether an effect is "
-          "proportional "
-          "to the payload.");
+          "Two payloads do not show whether an effect is proportional to the payload: a third one is "
+          "needed.");
     } else if (payloads.size() == 1) {
       limits.emplace_back("One payload: effects that depend on the load cannot be detected.");
     }
