@@ -12,7 +12,7 @@
 #include "base/utc_time.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
-#include "gap/verdict/offer.h"
+#include "gap/verdict/adopt.h"
 #include "report/report.h"
 #include "robot/robot_file.h"
 #include "server/diagnosis/confined.h"

@@ -12,7 +12,7 @@
 #include "base/error.h"
 #include "describe/table.h"
 #include "energy/back_test.h"
-#include "gap/verdict/offer.h"
+#include "gap/verdict/adopt.h"
 #include "history/store.h"
 #include "history/writer.h"
 #include "ingest/model_registry.h"

@@ -1,4 +1,4 @@
-#include "plausibility/faults.h"
+#include "plausibility/evidence.h"
 
 #include <algorithm>
 #include <bit>

@@ -7,7 +7,6 @@
 
 #include "plausibility/evaluation.h"
 #include "plausibility/evidence.h"
-#include "plausibility/faults.h"
 
 namespace joulecast::plausibility {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "gap/equations/power.h"
+#include "gap/equations/channels.h"
 
 namespace joulecast::gap {
 namespace {

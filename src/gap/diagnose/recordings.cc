@@ -11,7 +11,6 @@
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
 #include "gap/diagnose/ripple.h"
-#include "gap/equations/power.h"
 #include "gap/posterior/explain_recordings.h"
 #include "gap/traits.h"
 #include "gap/verdict/answer.h"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <utility>
@@ -66,5 +67,9 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
                                       const robot::RobotModel& robot, const Progress& progress = {});
 Result<Comparison> compare_runs(const RunSet& runs, std::span<const std::string> group_of_run,
                                 const robot::RobotModel& robot, const Progress& progress = {});
+
+// Returns the JSON that `joulecast gap --compare-by --json` prints: a diagnosis's JSON of the differences,
+// `kind` "comparison", and the fields of groups.
+nlohmann::ordered_json comparison_to_json(const Comparison& comparison);
 
 }  // namespace joulecast::gap

@@ -1,6 +1,6 @@
 #include "base/try.h"
 #include "gap/groups/comparer.h"
-#include "gap/runs/run_checks.h"
+#include "gap/runs/run_rows.h"
 
 namespace joulecast::gap {
 

@@ -1,7 +1,6 @@
-#include "gap/groups/comparison_json.h"
-
 #include <nlohmann/json.hpp>
 
+#include "gap/groups/compare.h"
 #include "gap/verdict/diagnosis_json.h"
 
 namespace joulecast::gap {

@@ -9,7 +9,7 @@
 #include <set>
 
 #include "base/try.h"
-#include "gap/runs/run_checks.h"
+#include "gap/runs/run_rows.h"
 #include "gap/verdict/answer.h"
 #include "gap/verdict/words.h"
 #include "statistics/regression.h"

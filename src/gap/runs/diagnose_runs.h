@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -34,5 +35,9 @@ struct RunDiagnosis {
 // energies. Fault::invalid for a robot with adopted effects that the catalogue rejects.
 Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot,
                                    bool robot_file_model = false, const Progress& progress = {});
+
+// Returns the JSON that `joulecast gap --missions --json` prints: a diagnosis's JSON, `kind`
+// "mission_energies", and the fields of runs.
+nlohmann::ordered_json runs_to_json(const RunDiagnosis& diagnosis);
 
 }  // namespace joulecast::gap

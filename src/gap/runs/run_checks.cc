@@ -1,5 +1,3 @@
-#include "gap/runs/run_checks.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,8 @@
 #include <optional>
 
 #include "gap/posterior/hold_out.h"
+#include "gap/posterior/terms.h"
+#include "gap/runs/run_rows.h"
 #include "gap/verdict/words.h"
 #include "statistics/regression.h"
 #include "statistics/robust.h"

@@ -4,6 +4,7 @@
 
 #include "gap/posterior/data.h"
 #include "gap/runs/run_table.h"
+#include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap {
 
@@ -47,5 +48,13 @@ class RunRows {
   bool by_motor_ = true, model_given_ = true;
   double model_ratio_ = 1;
 };
+
+// Faults of a table of runs, found before any effect is estimated: energies in another unit, or constant over
+// all runs, which contradicts all of them; single runs that are far from the prediction of all others.
+struct RunChecks {
+  std::vector<Check> checks;
+  std::vector<std::size_t> apart;  // runs that are far from the others
+};
+RunChecks check_runs(const RunRows& rows);
 
 }  // namespace joulecast::gap

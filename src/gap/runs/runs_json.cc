@@ -1,8 +1,7 @@
-#include "gap/runs/runs_json.h"
-
 #include <nlohmann/json.hpp>
 
 #include "describe/input.h"
+#include "gap/runs/diagnose_runs.h"
 #include "gap/verdict/diagnosis_json.h"
 
 namespace joulecast::gap {

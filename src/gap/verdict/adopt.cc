@@ -5,20 +5,24 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/try.h"
 #include "dynamics/catalogue.h"
 #include "gap/traits.h"
+#include "gap/verdict/words.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::gap {
 namespace {
 
 using Json = nlohmann::json;
+using described::Table;
+using robot::AdoptedEffect;
 
 // An effect with its numbers, without a check of the catalogue's bounds: a negative strength may reduce the
 // file's own.
-Result<dynamics::ActiveEffect> as_found(const robot::AdoptedEffect& adopted) {
+Result<dynamics::ActiveEffect> as_found(const AdoptedEffect& adopted) {
   const dynamics::Effect* effect = dynamics::find_effect(adopted.id);
   if (effect == nullptr) return invalid("/effects/" + adopted.id, "is not an effect of the catalogue");
   dynamics::ActiveEffect active = dynamics::initial(*effect);
@@ -66,12 +70,56 @@ double mean_of(const Json& value) {
   return sum / static_cast<double>(value.size());
 }
 
+AdoptedEffect effect_from(const Json& document) {
+  AdoptedEffect effect{document.at("id").get<std::string>(), {}};
+  for (const auto& [name, value] : document.at("parameters").items())
+    if (value.is_number()) effect.parameters.emplace_back(name, value.get<double>());
+  return effect;
+}
+
+std::vector<std::string> ids_of(const OfferedEffect& offered) {
+  std::vector<std::string> ids{offered.effect.id};
+  for (const AdoptedEffect& other : offered.instead) ids.push_back(other.id);
+  return ids;
+}
+
+// The chosen effects.
+Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<std::string>& wanted) {
+  std::set<std::string> unused(wanted.begin(), wanted.end());
+  std::vector<AdoptedEffect> chosen;
+  for (const OfferedEffect& offered : offer.effects) {
+    const std::vector<std::string> ids = ids_of(offered);
+    std::vector<std::string> named;
+    for (const std::string& id : ids) {
+      if (std::ranges::find(wanted, id) != wanted.end()) named.push_back(id);
+      unused.erase(id);
+    }
+    if (named.size() > 1)
+      return invalid("effect", fmt::format("{} are not distinguished: name one of them", enumerate(named)));
+    const auto other =
+        std::ranges::find(offered.instead, named.empty() ? "" : named.front(), &AdoptedEffect::id);
+    chosen.push_back(other == offered.instead.end() ? offered.effect : *other);
+    if (chosen.back().parameters.empty()) {
+      return fail(Fault::conflict, "effect",
+                  fmt::format("the diagnosis has no strength of {}: only {} can be adopted", chosen.back().id,
+                              offered.effect.id));
+    }
+  }
+  if (unused.empty()) return chosen;
+  std::vector<std::string> known;
+  for (const OfferedEffect& offered : offer.effects) {
+    for (std::string& id : ids_of(offered)) known.push_back(std::move(id));
+  }
+  return invalid("effect",
+                 fmt::format("{} is not among what was found: {}", *unused.begin(), enumerate(known)));
+}
+
 }  // namespace
 
-Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const robot::AdoptedEffect> found) {
-  for (const robot::AdoptedEffect& effect : found) {
+Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const AdoptedEffect> found) {
+  for (const AdoptedEffect& effect : found) {
     TRY_ASSIGN(dynamics::ActiveEffect more, as_found(effect));
-    auto present = std::ranges::find(robot.effects, effect.id, &robot::AdoptedEffect::id);
+    auto present = std::ranges::find(robot.effects, effect.id, &AdoptedEffect::id);
     if (present == robot.effects.end()) {
       robot.effects.push_back(dynamics::adopt(more));
       present = robot.effects.end() - 1;
@@ -91,11 +139,10 @@ Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const 
   return robot;
 }
 
-Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
-                                           std::span<const robot::AdoptedEffect> found) {
+Result<robot::RobotModel> with_corrections(robot::RobotModel robot, std::span<const AdoptedEffect> found) {
   Json file = robot::robot_to_json(robot);
-  std::vector<robot::AdoptedEffect> others;
-  for (const robot::AdoptedEffect& effect : found) {
+  std::vector<AdoptedEffect> others;
+  for (const AdoptedEffect& effect : found) {
     TRY_ASSIGN(const dynamics::ActiveEffect active, as_found(effect));
     if (const auto change = change_of(active, file)) {
       change_number(file[Json::json_pointer(change->pointer)], *change);
@@ -108,7 +155,7 @@ Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
 }
 
 std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
-                                           std::span<const robot::AdoptedEffect> found,
+                                           std::span<const AdoptedEffect> found,
                                            std::span<const double> deviations) {
   const Json file = robot::robot_to_json(robot);
   std::vector<FileCorrection> corrections;
@@ -117,7 +164,7 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
     if (!active) continue;
     const auto change = change_of(*active, file);
     if (!change) {
-      const auto had = std::ranges::find(robot.effects, found[k].id, &robot::AdoptedEffect::id);
+      const auto had = std::ranges::find(robot.effects, found[k].id, &AdoptedEffect::id);
       const auto in_file = had == robot.effects.end() ? std::nullopt : std::optional(as_found(*had));
       const auto parameters = active->effect->info().parameters;
       std::size_t at = 0;  // of its strength, which has a value
@@ -136,6 +183,67 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
                            scales ? deviations[k] * std::fabs(value) : deviations[k]});
   }
   return corrections;
+}
+
+Offer offer_of(const Diagnosis& d) {
+  Offer offer;
+  for (const AdoptedEffect& effect : d.adoptable) {
+    OfferedEffect& offered = offer.effects.emplace_back();
+    offered.effect = effect;
+    const auto diagnosed = std::ranges::find(d.effects, effect.id, &DiagnosedEffect::id);
+    if (diagnosed == d.effects.end()) continue;
+    for (const std::string& id : diagnosed->alternatives) {
+      const auto known = std::ranges::find(diagnosed->instead, id, &AdoptedEffect::id);
+      offered.instead.push_back(known == diagnosed->instead.end() ? AdoptedEffect{id, {}} : *known);
+    }
+  }
+  offer.corrects_file = d.verdict == Verdict::not_this_robot;
+  offer.refusal = d.refusal;
+  return offer;
+}
+
+const Table<Offer>& offer_table() {
+  static const auto effect = Table<AdoptedEffect>()
+                                 .value("id", &AdoptedEffect::id, "effect of the catalogue")
+                                 .map("parameters", &AdoptedEffect::parameters, "by name", true);
+  static const auto offered =
+      Table<OfferedEffect>()
+          .include(effect, &OfferedEffect::effect)
+          .list("instead", &OfferedEffect::instead,
+                "alternatives that the data do not distinguish from it; without parameters: of unknown "
+                "strength",
+                effect);
+  static const auto table =
+      Table<Offer>()
+          .text_or_null("refusal", &Offer::refusal, "reason against adoption; null: can be adopted")
+          .value("corrects_file", &Offer::corrects_file,
+                 "effects with a parameter in the robot file correct that parameter")
+          .list("effects", &Offer::effects, "effects with the parameters to adopt", offered);
+  return table;
+}
+
+Result<Offer> offer_from_json(const Json& diagnosis) {
+  try {
+    const Json& adoption = diagnosis.at("adoption");
+    Offer offer;
+    for (const Json& e : adoption.at("effects")) {
+      OfferedEffect& offered = offer.effects.emplace_back(effect_from(e));
+      for (const Json& other : e.at("instead")) offered.instead.push_back(effect_from(other));
+    }
+    offer.corrects_file = adoption.at("corrects_file").get<bool>();
+    if (const Json& refusal = adoption.at("refusal"); refusal.is_string())
+      offer.refusal = refusal.get<std::string>();
+    return offer;
+  } catch (const Json::exception&) {
+    return fail(Fault::corrupt, "", "the diagnosis does not state what may be adopted");
+  }
+}
+
+Result<robot::RobotModel> take(const Offer& offer, const robot::RobotModel& robot, const Choice& choice) {
+  if (offer.effects.empty()) return fail(Fault::conflict, "", offer.refusal);
+  if (!offer.refusal.empty() && !choice.force) return fail(Fault::conflict, "", offer.refusal);
+  TRY_ASSIGN(const std::vector<AdoptedEffect> chosen, choose(offer, choice.effects));
+  return offer.corrects_file ? with_corrections(robot, chosen) : with_effects(robot, chosen);
 }
 
 }  // namespace joulecast::gap

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "gap/traits.h"
-#include "gap/verdict/offer.h"
+#include "gap/verdict/adopt.h"
 #include "gap/verdict/text.h"
 
 namespace joulecast::gap {

@@ -1,4 +1,4 @@
-#include "gap/verdict/offer.h"
+#include "gap/verdict/adopt.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
