@@ -14,7 +14,6 @@
 #include "gap/posterior/explain_recordings.h"
 #include "gap/traits.h"
 #include "gap/verdict/answer.h"
-#include "gap/verdict/figures.h"
 #include "gap/verdict/next_drive.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/where.h"

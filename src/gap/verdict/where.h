@@ -1,16 +1,13 @@
 #pragma once
 
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "gap/equations/channels.h"
 #include "gap/verdict/diagnosis.h"
+#include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
-
-// Returns standstill, turning, acceleration, braking or cruise.
-std::string_view phase_of(const Window& window, double wheel_radius_m);
 
 // Returns the regions of every variable in which the mean residual of battery power differs significantly
 // from zero (block standard errors, Bonferroni), sorted by the excess of their share of the gap over that of
@@ -20,5 +17,11 @@ std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::
                                   std::span<const dynamics::ActiveEffect> adopted,
                                   std::span<const double> measured_w, std::span<const double> modelled_w,
                                   double noise_floor);
+
+// Returns the data of a report's plots: residual power over its candidate variables, over the floor, over
+// time and by mission, by the model as it is and with the effects found. Powers are of the windows, in watts.
+Figures figures_of(std::span<const Window> windows, std::span<const double> measured_w,
+                   std::span<const double> before_w, std::span<const double> after_w,
+                   const telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap
