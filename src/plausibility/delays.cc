@@ -124,7 +124,6 @@ double best_lag(const Eigen::VectorXd& part) {
          (bend < 0 ? 0.5 * (before - after) / bend : 0.0);
 }
 
-constexpr auto motors = std::to_array({Late::current_right, Late::current_left});
 constexpr double sharp = 0.5;  // interval over the delay, of a battery's behind the motors
 
 // Smallest delay that is accepted as one: a row and a half, plus half of the time for which these readings or
@@ -194,60 +193,52 @@ void Lags::correlate(const telemetry::Recording& mission) {
   for (auto& blocks : blocks_) std::erase_if(blocks, [](const LagBlock& b) { return b.rows == 0; });
 }
 
-std::optional<Delay> Lags::delay(std::span<const Late> channels) const {
-  std::size_t count = std::numeric_limits<std::size_t>::max();
-  for (const Late late : channels) count = std::min(count, blocks_[static_cast<std::size_t>(late)].size());
-  if (count < fewest_blocks) return std::nullopt;
+std::optional<Delay> Lags::delay(Late late) const {
+  const auto k = static_cast<std::size_t>(late);
+  const std::vector<LagBlock>& blocks = blocks_[k];
+  if (blocks.size() < fewest_blocks) return std::nullopt;
   // Blocks are grouped: draws of some dozen groups scatter as much as draws of thousands of blocks.
-  const std::size_t groups = std::min(count, most_groups);
-  std::vector<std::vector<LagBlock>> grouped;
-  for (const Late late : channels) {
-    const auto k = static_cast<std::size_t>(late);
-    grouped.emplace_back(groups, empty(k));
-    for (std::size_t n = 0; n < count; ++n) grouped.back()[n * groups / count].join(blocks_[k][n]);
-  }
-  const auto parts = [&](std::span<const int> weights) {
-    Eigen::VectorXd part = Eigen::VectorXd::Zero(lags);
-    for (std::size_t k = 0; k < channels.size(); ++k) {
-      LagBlock sums = empty(static_cast<std::size_t>(channels[k]));
-      for (std::size_t n = 0; n < groups; ++n)
-        if (weights[n] > 0) sums.join(grouped[k][n], weights[n]);
-      part += explained(sums) / static_cast<double>(channels.size());
-    }
-    return part;
+  const std::size_t groups = std::min(blocks.size(), most_groups);
+  std::vector<LagBlock> grouped(groups, empty(k));
+  for (std::size_t n = 0; n < blocks.size(); ++n) grouped[n * groups / blocks.size()].join(blocks[n]);
+  const auto part_of = [&](std::span<const int> weights) {
+    LagBlock sums = empty(k);
+    for (std::size_t n = 0; n < groups; ++n)
+      if (weights[n] > 0) sums.join(grouped[n], weights[n]);
+    return explained(sums);
   };
-  const Eigen::VectorXd part = parts(std::vector<int>(groups, 1));
+  const Eigen::VectorXd part = part_of(std::vector<int>(groups, 1));
   const double lag = best_lag(part);
   if (!std::isfinite(lag) || part.maxCoeff() < least_explained) return std::nullopt;
   const auto interval = statistics::bootstrap_interval(
-      groups, [&](std::span<const int> w) { return step_s_ * best_lag(parts(w)); }, draws);
+      groups, [&](std::span<const int> w) { return step_s_ * best_lag(part_of(w)); }, draws);
   return Delay{step_s_ * lag, interval};
 }
 
+// That of one of the motor currents.
+std::optional<Delay> delay_of_motors(const CheckContext& c) {
+  const auto right = c.lags.delay(Late::current_right);
+  return right ? right : c.lags.delay(Late::current_left);
+}
+
 std::optional<Delay> motor_delay(const CheckContext& c) {
-  for (const auto& channels : {std::span<const Late>(motors), std::span<const Late>(motors).first(1),
-                               std::span<const Late>(motors).last(1)}) {
-    const auto delay = c.lags.delay(channels);
-    if (!delay) continue;
-    const double least = least_delay_s(c, {reading::motor_current, reading::motor_current + 1});
-    return delay->interval[0] > least ? delay : std::nullopt;
-  }
-  return std::nullopt;
+  const auto delay = delay_of_motors(c);
+  const double least = least_delay_s(c, {reading::motor_current, reading::motor_current + 1});
+  return delay && delay->interval[0] > least ? delay : std::nullopt;
 }
 
 void check_delays(const CheckContext& c, Checks& checks) {
   using namespace reading;
   if (!c.heard({0, 1})) return;
-  const auto delay = [&](Late late) { return c.lags.delay(std::array{late}); };
   const auto late = c.heard({4, 5}) ? motor_delay(c) : std::nullopt;
   if (late) add_delay(checks, "electrical_delay", "motor_current", "The motor currents", *late);
   if (c.heard({battery_voltage, battery_current})) {
     const double least = least_delay_s(c, {battery_voltage, battery_current});
     const char* name = "Voltage and current of the battery";
-    const auto behind = c.heard({2, 3, 4, 5}) ? delay(Late::battery_by_motors) : std::nullopt;
+    const auto behind = c.heard({2, 3, 4, 5}) ? c.lags.delay(Late::battery_by_motors) : std::nullopt;
     // If the motor currents lead, the shape of the load causes the apparent delay.
-    const auto own = c.heard({4, 5}) ? c.lags.delay(motors) : std::nullopt;
-    const auto power = delay(Late::battery_power);
+    const auto own = c.heard({4, 5}) ? delay_of_motors(c) : std::nullopt;
+    const auto power = c.lags.delay(Late::battery_power);
     // Wrong currents differ in shape from the battery's power; every lag then fits a little. The interval
     // must be narrow.
     if (behind && behind->interval[1] - behind->interval[0] < sharp * std::fabs(behind->value_s) &&
@@ -259,7 +250,7 @@ void check_delays(const CheckContext& c, Checks& checks) {
   }
   if (!c.heard({yaw_rate})) return;
   const double least = least_delay_s(c, {yaw_rate});
-  if (const auto d = delay(Late::yaw_rate); d && (d->interval[0] > least || d->interval[1] < -least))
+  if (const auto d = c.lags.delay(Late::yaw_rate); d && (d->interval[0] > least || d->interval[1] < -least))
     add_delay(checks, "yaw_rate_delay", "yaw_rate", "The gyro's readings", *d);
 }
 

@@ -35,8 +35,8 @@ class Lags {
  public:
   explicit Lags(std::span<const telemetry::Recording> missions);
 
-  // Common delay of the channels over all missions. Empty where the motion explains too little of them.
-  std::optional<Delay> delay(std::span<const Late> channels) const;
+  // Delay of a channel over all missions. Empty where the motion explains too little of it.
+  std::optional<Delay> delay(Late late) const;
 
  private:
   void correlate(const telemetry::Recording& mission);

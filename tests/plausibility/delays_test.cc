@@ -29,18 +29,16 @@ telemetry::Recording drive(double delay_s, double rate_hz, std::uint64_t seed) {
 class AtRate : public ::testing::TestWithParam<double> {};
 
 TEST_P(AtRate, FindsDelayBetweenRows) {
-  constexpr std::array currents{Late::current_right, Late::current_left};
-  constexpr std::array yaw{Late::yaw_rate};
   for (const double delay : {0.0, 0.07, 0.21}) {
     const auto mission = drive(delay, GetParam(), 11);
     const Lags lags({&mission, 1});
-    const auto found = lags.delay(currents);
+    const auto found = lags.delay(Late::current_right);
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->value_s, delay, std::max(0.02, 0.4 / GetParam()));  // slow rows resolve less
     EXPECT_LE(found->interval[0], found->value_s);
     EXPECT_GE(found->interval[1], found->value_s);
     EXPECT_LT(found->interval[1] - found->interval[0], 0.08);
-    const auto gyro = lags.delay(yaw);
+    const auto gyro = lags.delay(Late::yaw_rate);
     ASSERT_TRUE(gyro);
     EXPECT_NEAR(gyro->value_s, 0, 0.005);
   }
@@ -56,8 +54,8 @@ TEST(Delays, ReturnsNothingForUnrelatedCurrents) {
     s.motor_current_a = {normal(random), normal(random)};
   });
   const Lags lags({&recording, 1});
-  EXPECT_FALSE(lags.delay(std::array{Late::current_right}));
-  EXPECT_FALSE(lags.delay(std::array{Late::battery_power}));
+  EXPECT_FALSE(lags.delay(Late::current_right));
+  EXPECT_FALSE(lags.delay(Late::battery_power));
 }
 
 }  // namespace
