@@ -97,14 +97,10 @@ class Reasons {
         say("the error is {} of the power at a noise floor of {}, and no effect of the catalogue explains it "
             "well enough to be named",
             percent(d_.power_absolute_relative), percent(d_.noise_floor));
-      else if (d_.detectable_share < d_.noise_floor)
+      else
         say("the error is {} of the power, which may be noise or a hidden cause: nothing in these recordings "
             "predicts it",
             percent(d_.power_absolute_relative));
-      else
-        say("an effect of less than {} of the power is not detectable in these recordings: that none was "
-            "found proves little",
-            percent(d_.detectable_share));
     }
     if (said_.empty() && !d_.effects.empty()) {
       const auto least = std::ranges::min(d_.effects, {}, &DiagnosedEffect::probability);
@@ -143,11 +139,6 @@ class Reasons {
     if (e.varies > notable_scatter)
       say("the strength of {} varies by {} of its mean during the recordings", words_of(e.id),
           percent(e.varies));
-    const auto battery = std::ranges::find(e.parameters, "battery", &DiagnosedParameter::name);
-    const bool of_motors_alone = battery != e.parameters.end() && battery->value == 0;
-    if ((e.id == "current_sensor_gain" || e.id == "voltage_sensor_gain") && d_.motor_channels &&
-        !of_motors_alone)
-      say("a load proportional to the current would look like {}", words_of(e.id));
   }
 
   void regression() {
