@@ -235,7 +235,7 @@ class Diagnoser {
     const auto before = all(fit_->unchanged_w),
                after = d_.verdict == Verdict::none ? before : all(answer_.explained_w);
     if (d_.verdict != Verdict::none)
-      d_.where = localise(windows, robot_, fit_->data.in_file, rows.power_w, before, d_.noise_floor);
+      d_.where = localise(windows, robot_, rows.power_w, before, d_.noise_floor);
     d_.figures = figures_of(windows, rows.power_w, before, after, recordings_, robot_);
   }
 

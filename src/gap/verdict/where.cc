@@ -19,14 +19,8 @@ namespace {
 constexpr double where_block_s = 8;
 constexpr double min_where_share = 0.03;  // of the gap, beyond the share of the time
 constexpr double beyond_noise = 1.3;
-constexpr int where_cells = 10;
-constexpr std::size_t fewest_in_region = 5, most_regions = 24;
+constexpr std::size_t most_regions = 24;
 constexpr std::array phase_names{"standstill", "acceleration", "cruise", "braking", "turning"};
-
-struct Part {
-  std::string channel;
-  std::vector<double> residual_w;
-};
 
 // Index of its name.
 std::size_t phase_of(const Window& w, double radius) {
@@ -39,34 +33,6 @@ std::size_t phase_of(const Window& w, double radius) {
   if (along > 0.08) return 1;
   if (along < -0.08) return 3;
   return 2;
-}
-
-std::vector<Part> parts_of(std::span<const Window> windows, const robot::RobotModel& robot,
-                           std::span<const dynamics::ActiveEffect> adopted,
-                           std::span<const double> measured_w, std::span<const double> modelled_w) {
-  const std::size_t n = windows.size();
-  std::vector<Part> parts{{"battery_power", std::vector<double>(n)}};
-  const dynamics::DriveModel model(robot, adopted);
-  Part bus{std::string(name_of(Channel::bus)), std::vector<double>(n, 0.0)};
-  Part voltage{std::string(name_of(Channel::voltage_right)), std::vector<double>(n, 0.0)};
-  Part torque{std::string(name_of(Channel::torque_right)), std::vector<double>(n, 0.0)};
-  std::size_t motors = 0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const Window& w = windows[k];
-    parts[0].residual_w[k] = measured_w[k] - modelled_w[k];
-    const ChannelValues<double> r = residuals(model, w, false);
-    const double electrical = r[0] * w.current_a[0] + r[1] * w.current_a[1];
-    const double at_bus = r[index_of(Channel::bus)];
-    if (!std::isfinite(parts[0].residual_w[k] + electrical + at_bus)) continue;
-    bus.residual_w[k] = at_bus;
-    voltage.residual_w[k] = electrical;
-    torque.residual_w[k] = parts[0].residual_w[k] - at_bus - electrical;
-    ++motors;
-  }
-  if (motors > n / 2) {
-    for (Part* part : {&bus, &voltage, &torque}) parts.push_back(std::move(*part));
-  }
-  return parts;
 }
 
 // The windows of a phase, a range of a variable, or a square of the floor with its lower corner at (from,
@@ -138,7 +104,6 @@ std::vector<std::pair<double, double>> block_sums(std::span<const Window> window
                                                   std::span<const double> residual_w) {
   std::map<std::pair<std::size_t, int>, std::pair<double, double>> blocks;
   for (const std::size_t k : region.windows) {
-    if (!std::isfinite(residual_w[k])) continue;
     auto& [sum, count] = blocks[{windows[k].mission, static_cast<int>(windows[k].t_s / where_block_s)}];
     sum += residual_w[k];
     ++count;
@@ -159,7 +124,7 @@ std::vector<Variable> variables_of(std::span<const Window> windows, const robot:
     return ranges_of(windows, value, count);
   };
   double side_m = 0;
-  std::vector<Region> squares = squares_of(windows, where_cells, 0.05, side_m);
+  std::vector<Region> squares = squares_of(windows, 10, 0.05, side_m);
   for (Region& one : squares) {
     one.label = fmt::format("x {:.1f} to {:.1f}, y {:.1f} to {:.1f}", one.from, one.from + side_m, one.to,
                             one.to + side_m);
@@ -182,15 +147,12 @@ std::vector<Variable> variables_of(std::span<const Window> windows, const robot:
       {"heading_rad",
        ranges(8, [](const Window& w) { return std::remainder(w.heading_rad, 2 * std::numbers::pi); })},
       {"floor_m", std::move(squares)}};
-  for (Variable& one : all)
-    std::erase_if(one.regions, [](const Region& g) { return g.windows.size() < fewest_in_region; });
+  for (Variable& one : all) std::erase_if(one.regions, [](const Region& g) { return g.windows.size() < 5; });
   return all;
 }
 
-constexpr std::size_t figure_bins = 9;
-constexpr std::ptrdiff_t min_figure_windows = 40;
-constexpr double outermost = 0.005;  // of the windows would extend an axis
-constexpr double stretch_s = 90;     // of power over time
+constexpr std::size_t figure_bins = 9, min_figure_windows = 40;
+constexpr double stretch_s = 90;  // of power over time
 constexpr int floor_cells = 26;
 constexpr std::size_t fewest_in_cell = 3, fewest_in_bin = 5;
 constexpr std::size_t most_missions = 40;
@@ -298,48 +260,40 @@ class Collector {
 }  // namespace
 
 std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::RobotModel& robot,
-                                  std::span<const dynamics::ActiveEffect> adopted,
                                   std::span<const double> measured_w, std::span<const double> modelled_w,
                                   double noise_floor) {
-  const std::vector<Part> parts = parts_of(windows, robot, adopted, measured_w, modelled_w);
   const std::vector<Variable> variables = variables_of(windows, robot);
-  double total = 0, size = 0, known = 0;
+  std::vector<double> residual_w;
+  double total = 0, size = 0, looks = 0;
   for (std::size_t k = 0; k < windows.size(); ++k) {
-    const double e = parts[0].residual_w[k];
-    if (!std::isfinite(e)) continue;
-    total += std::fabs(e);
+    residual_w.push_back(measured_w[k] - modelled_w[k]);
+    total += std::fabs(residual_w[k]);
     size += std::fabs(measured_w[k]);
-    ++known;
   }
   std::vector<WhereRegion> found;
   if (total <= 0 || total / size < beyond_noise * noise_floor) return found;
-  double looks = 0;
-  for (const Variable& variable : variables)
-    looks += static_cast<double>(variable.regions.size() * parts.size());
+  for (const Variable& variable : variables) looks += static_cast<double>(variable.regions.size());
   const double quantile = statistics::normal_quantile(1 - 0.025 / looks);
-  for (const Part& part : parts) {
-    for (const auto& [name, regions] : variables) {
-      for (const Region& region : regions) {
-        const auto blocks = block_sums(windows, region, part.residual_w);
-        if (blocks.size() < 3) continue;
-        double sum = 0, count = 0, variance = 0;
-        for (const auto& block : blocks) sum += block.first, count += block.second;
-        const double n = static_cast<double>(blocks.size());
-        for (const auto& block : blocks) variance += std::pow(block.first - sum / n, 2);
-        const double most = quantile * std::sqrt(variance * n / (n - 1));
-        const double share = sum / total, time_share = count / known;
-        if (std::fabs(sum) < most || std::fabs(share) - time_share < min_where_share) continue;
-        WhereRegion here{part.channel, name,  region.label, region.from,
-                         region.to,    share, time_share,   {(sum - most) / total, (sum + most) / total}};
-        const auto same = std::ranges::find_if(found, [&](const WhereRegion& w) {
-          return w.variable == name && w.label == region.label && w.from == region.from &&
-                 (w.share > 0) == (share > 0);
-        });
-        if (same == found.end())
-          found.push_back(std::move(here));
-        else if (std::fabs(same->share) < std::fabs(share))
-          *same = std::move(here);
-      }
+  for (const auto& [name, regions] : variables) {
+    for (const Region& region : regions) {
+      const auto blocks = block_sums(windows, region, residual_w);
+      if (blocks.size() < 3) continue;
+      double sum = 0, variance = 0;
+      for (const auto& block : blocks) sum += block.first;
+      const double n = static_cast<double>(blocks.size());
+      for (const auto& block : blocks) variance += std::pow(block.first - sum / n, 2);
+      const double most = quantile * std::sqrt(variance * n / (n - 1)), share = sum / total;
+      const double time_share =
+          static_cast<double>(region.windows.size()) / static_cast<double>(windows.size());
+      if (std::fabs(sum) < most || std::fabs(share) - time_share < min_where_share) continue;
+      found.push_back({"battery_power",
+                       name,
+                       region.label,
+                       region.from,
+                       region.to,
+                       share,
+                       time_share,
+                       {(sum - most) / total, (sum + most) / total}});
     }
   }
   std::ranges::stable_sort(found, std::greater{},
@@ -370,10 +324,11 @@ Figures figures_of(std::span<const Window> windows, std::span<const double> meas
           return std::remainder(w.heading_rad, 2 * std::numbers::pi) * 180 / std::numbers::pi;
         }}}};
   for (const auto& [axis, value] : variables) {
-    const auto known =
-        std::ranges::count_if(windows, [&](const Window& w) { return std::isfinite(value(w)); });
+    std::size_t known = 0;
+    for (const Window& w : windows) known += std::isfinite(value(w)) ? 1 : 0;
     if (known < min_figure_windows) continue;
-    if (const auto ranges = ranges_of(windows, value, figure_bins, outermost); !ranges.empty())
+    // The outermost half percent would extend the axis for a few windows.
+    if (const auto ranges = ranges_of(windows, value, figure_bins, 0.005); !ranges.empty())
       figures.maps.push_back(collect.map(axis, ranges));
   }
   collect.floor(figures);
