@@ -178,7 +178,7 @@ TEST_F(CheckCommand, RestartedTimesAreMissions) {
   const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
       "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}],
       "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"}}})");
-  EXPECT_EQ(check({file("run.csv", csv), "--mapping", how}), Exit::warned);
+  EXPECT_EQ(check({file("run.csv", csv), "--mapping", how, "--json"}), Exit::warned);
   EXPECT_THAT(printed_, HasSubstr("line 202: the time goes back by 9.95 s: a new mission begins"));
   EXPECT_THAT(printed_, HasSubstr("line 402 is the last of 2 at which a mission begins so"));
   EXPECT_THAT(printed_, ::testing::Not(HasSubstr("gap")));

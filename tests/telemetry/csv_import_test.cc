@@ -249,7 +249,7 @@ TEST(CsvImport, ErrorsNameLineAndColumn) {
   EXPECT_THAT(import_csv("t,r,l\n,1,1\n", mapping_of("")).error().message, HasSubstr("is no time"));
   EXPECT_THAT(import_csv("t,r,l\n-1,1,1\n", mapping_of("")).error().message, HasSubstr("1970"));
   EXPECT_THAT(import_csv("t,r,l\n9223372036854775807,1,1\n", mapping_of("")).error().message,
-              HasSubstr("no time"));
+              HasSubstr("later than the year 2100"));
   EXPECT_THAT(import_csv("t,r\n0,1\n", mapping_of("")).error().message, HasSubstr("'l' is missing"));
   EXPECT_THAT(import_csv("t,r,l\n0,,\n", mapping_of("")).error().message,
               HasSubstr("1 of 1 rows of missions would be lost: 0 have the time"));
