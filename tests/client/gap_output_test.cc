@@ -6,8 +6,8 @@
 
 #include "client/commands/outcome.h"
 #include "client/commands/print.h"
-#include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/adopt.h"
+#include "gap/verdict/diagnosis_json.h"
 #include "tests/gap/verdict/made_diagnosis.h"
 
 namespace joulecast::client {

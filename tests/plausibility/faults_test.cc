@@ -1,10 +1,9 @@
-#include "plausibility/evidence.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
+#include "plausibility/evidence.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::plausibility {

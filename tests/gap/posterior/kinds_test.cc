@@ -5,8 +5,8 @@
 
 #include "gap/diagnose/recordings.h"
 #include "gap/posterior/functions.h"
-#include "gap/verdict/answer.h"
 #include "gap/verdict/adopt.h"
+#include "gap/verdict/answer.h"
 #include "tests/gap/posterior/made_robot.h"
 
 // Kinds of failure that were seen on real recordings, each in the smallest case that shows it.

@@ -1,11 +1,10 @@
-#include "gap/verdict/adopt.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
+#include "gap/verdict/adopt.h"
 #include "gap/verdict/answer.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "gap/verdict/text.h"
