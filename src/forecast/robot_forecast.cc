@@ -29,6 +29,9 @@ constexpr std::array<Scatter, subject_count> assumed{{{{0.045, 0.045, 0.055}, 0.
                                                       {{0.05, 0.125, 0.135}, 0.03}}};
 constexpr double assumed_legs = 5, assumed_common_missions = 2;
 
+// Estimates from fewer kept missions are repeated, up to so many missions in all.
+constexpr std::int64_t few_missions = 6;
+
 constexpr double keep_of(bool changed) {
   return changed ? change_keep : evidence_keep;
 }
@@ -425,7 +428,9 @@ void RobotForecast::learn(PastMission mission) {
 
   habit_ = habit_of(robot_, recent(missions_, missions_.size()), kind_habit());
   if (learnt_ == settles_at_) {
-    for (std::size_t k = 0; k < subject_count; ++k) settle(static_cast<Subject>(k));
+    // What deviations and payloads are shares of depends on the estimate, which one mission may move far.
+    for (std::int64_t seen = 0; seen < few_missions; seen += std::ssize(missions_))
+      for (std::size_t k = 0; k < subject_count; ++k) settle(static_cast<Subject>(k));
     settles_at_ += std::max<std::int64_t>(1, std::ssize(missions_) / 4);
   }
 }

@@ -370,6 +370,34 @@ TEST(RobotForecast, HaltsContainLateStops) {
   EXPECT_NEAR(f->energy(sum).quantile(0.5) / truth_j, 1, 0.003);
 }
 
+// Turns take four times the model's energy: one mission of a loaded robot shows its like.
+TEST(RobotForecast, FirstMissionIsFittedThroughout) {
+  MadeMissions made(19);
+  Rng rng(20);
+  const LegPricer pricer(made.robot, made.drive);
+  const Pace pace = default_pace(made.robot);
+  const double payload_kg = made.robot.limits.payload_kg;
+  RobotForecast forecast(made.robot, made.drive);
+  PastMission mission{1, {}};
+  std::vector<PricedLeg> plan;
+  double measured_j = 0;
+  for (int k = 0; k < 10; ++k) {
+    const Motion motion = k % 2 == 0 ? Motion::turn : Motion::drive;
+    const double way = rng.uniform(3, 8);
+    const LegCost cost = pricer.paced(PlannedLeg{motion, way, 0, payload_kg, 0}, pace);
+    mission.legs.push_back({motion, cost.duration_s, way,
+                            motion == Motion::turn ? pace.yaw_rate_rad_s : pace.speed_m_s, 0, payload_kg,
+                            cost.standing_j + (motion == Motion::turn ? 4 : 1.6) * cost.motor_j});
+    measured_j += mission.legs.back().battery_j;
+    plan.push_back({motion, payload_kg, 0, cost});
+  }
+  forecast.learn(std::move(mission));
+  const auto f = forecast.forecaster();
+  PlanSum sum;
+  for (const PricedLeg& leg : plan) f->extend(sum, leg);
+  EXPECT_NEAR(f->energy(sum).quantile(0.5) / measured_j, 1, 0.004);
+}
+
 // A robot that has followed one plan exactly takes as long for another, with any payload.
 TEST(RobotForecast, FirstPlansLastAsStated) {
   MadeMissions made(14);
