@@ -104,8 +104,10 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
   if (all.empty())
-    return invalid("log", fmt::format("contains no telemetry of {}{}{}", robot_id,
-                                      log.robots.empty() ? "" : ", only of ", fmt::join(log.robots, ", ")));
+    return invalid("log", log.robots.contains(robot_id)
+                              ? fmt::format("contains no usable telemetry of {} in a mission", robot_id)
+                              : fmt::format("contains no telemetry of {}, only of {}", robot_id,
+                                            fmt::join(log.robots, ", ")));
   for (telemetry::Recording& r : all) {
     if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
   }

@@ -183,13 +183,18 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
   TRY_ASSIGN(const auto mapping, read_mapping(options.mapping));
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
-  // Dates are not checked. Missions follow each other without a gap.
-  how.start_utime_us = telemetry::year_2000_utime_us;
   how.pause_us = 1'000'000;
+  std::int64_t next_start_utime_us = telemetry::year_2000_utime_us;
   std::vector<telemetry::Recording> recordings;
   std::map<std::string, std::int64_t> next;
   for (const std::string& table : tables) {
+    how.start_utime_us.reset();
     auto imports = import_table(table, mapping, how);
+    // Missions without a date follow each other.
+    if (imports && imports->front().recording.samples.front().utime_us < telemetry::year_2000_utime_us) {
+      how.start_utime_us = next_start_utime_us;
+      imports = import_table(table, mapping, how);
+    }
     report.add(table, "table");
     if (!imports) {
       std::string place = imports.error().field;
@@ -205,7 +210,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
       number_on(import.recording, next);
       for (const signals::Sample& sample : import.recording.samples)
         report.watch.add(import.recording.robot_id, sample);
-      how.start_utime_us = import.recording.samples.back().utime_us + how.pause_us;
+      next_start_utime_us = import.recording.samples.back().utime_us + how.pause_us;
       recordings.push_back(std::move(import.recording));
     }
   }

@@ -300,7 +300,7 @@ void print_diagnosis(const Json& d, const std::string& unit) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  // Of an inconclusive verdict and of another robot it is the probability of the likeliest effect, below.
+  // The other verdicts have no probability of their own.
   const bool own_probability = d["verdict"] != "inconclusive" && d["verdict"] != "not_this_robot";
   fmt::print("verdict: {}{}\n", text(d.value("verdict_title", d["verdict"])),
              own_probability

@@ -201,8 +201,11 @@ Result<Response> post_model(Services& services, const Request& request) {
             [answer, about_to](std::int64_t version) { return answer(about_to, version); });
       });
   // The diagnosis expects the version that it is about.
-  if (!adoption && adoption.error().field == "/expected_version" && !read.expected_version)
+  if (!adoption && adoption.error().field == "/expected_version" && !read.expected_version) {
     adoption.error().field = "/diagnosis_id";
+    adoption.error().message = "the diagnosis is about another model: " + adoption.error().message +
+                               "; set force to adopt it anyway";
+  }
   if (adoption && !adoption->adopted && !read.dry_run) return refused(request, *adoption);
   if (adoption && !adoption->adopted) return answer(*adoption, adoption->version);
   return change.result(adoption.map(&server::Adoption::version));

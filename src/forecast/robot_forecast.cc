@@ -428,7 +428,7 @@ void RobotForecast::learn(PastMission mission) {
 
   habit_ = habit_of(robot_, recent(missions_, missions_.size()), kind_habit());
   if (learnt_ == settles_at_) {
-    // What deviations and payloads are shares of depends on the estimate, which one mission may move far.
+    // Deviations and payloads are relative to the estimate, which one mission may change much.
     for (std::int64_t seen = 0; seen < few_missions; seen += std::ssize(missions_))
       for (std::size_t k = 0; k < subject_count; ++k) settle(static_cast<Subject>(k));
     settles_at_ += std::max<std::int64_t>(1, std::ssize(missions_) / 4);

@@ -54,6 +54,12 @@ struct RowPlace {
   bool early = false;  // before a row that is before it in the table
 };
 
+// Lines at which the time jumps so that a new mission begins.
+struct Restarts {
+  std::size_t count = 0, last_line = 0;
+  std::string_view direction;
+};
+
 // Rows of the main table that belong to one mission.
 struct Part {
   std::string mission;  // by the mission's column
@@ -241,9 +247,10 @@ class Importer {
       notes_.push_back(
           R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
           " holds them between the rows");
-    if (restarts_ > 1)
-      notes_.push_back(
-          fmt::format("line {} is the last of {} at which a mission begins so", last_restart_, restarts_));
+    for (const auto& [count, last_line, direction] : restarts_)
+      if (count > 1)
+        notes_.push_back(
+            fmt::format("the time goes {} at {} lines, the last one line {}", direction, count, last_line));
     for (const ImportTarget& target : mapping_.targets)
       if (has_no_value(target.number)) notes_.push_back("no row has a value of " + target.name);
     first.settings_detected = table_.settings().size();
@@ -539,10 +546,11 @@ class Importer {
     part_ = row.part;
     const double step_s = parts_[part_].step_s;
     if (step_s == 0) return {};
-    last_restart_ = table_.line();
-    if (restarts_++ == 0)
+    auto& [count, last_line, direction] = restarts_[step_s < 0 ? 0 : 1];
+    last_line = table_.line();
+    if (count++ == 0)
       notes_.push_back(fmt::format("line {}: the time goes {} by {:.10g} s: a new mission begins{}",
-                                   last_restart_, step_s < 0 ? "back" : "forward", std::abs(step_s),
+                                   last_line, direction, std::abs(step_s),
                                    step_s > 0 ? ""
                                    : mapping_.layout.time_unit_ns > 0
                                        ? R"(; set "wraps_at" for a time that overflows)"
@@ -679,8 +687,8 @@ class Importer {
   std::optional<std::int64_t> shift_us_;
   bool repeats_ = false;  // a reading that is written is the same as the one before
   std::vector<Part> parts_;
-  std::size_t part_ = 0;                         // that the present row belongs to
-  std::size_t restarts_ = 0, last_restart_ = 0;  // of the time: their number, and the last one's line
+  std::size_t part_ = 0;  // that the present row belongs to
+  std::array<Restarts, 2> restarts_{{{.direction = "back"}, {.direction = "forward"}}};
   std::map<std::string, std::size_t> missions_called_;
   std::vector<std::string> notes_;
   Import open_;

@@ -107,7 +107,7 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
   if (!read) return corrupt(1, "the table is empty; a header is needed");
   if (std::ranges::any_of(names,
                           [](std::string_view name) { return name.find('\0') != std::string_view::npos; }))
-    return corrupt(1, "has zero bytes: the file is not text");
+    return corrupt(table.line(), "the header has zero bytes: the file is not text");
   table.header_.assign(names.begin(), names.end());
   return table;
 }

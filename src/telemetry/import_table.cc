@@ -292,7 +292,7 @@ Result<std::int64_t> ImportTable::time() {
     const auto number = parse_number(cell, decimal_comma_, grouped_);
     const auto part = time_us(cell, layout_.time_unit_ns, layout_.time_columns[k].scale, number);
     if (!part && number && *number > 0)
-      return refuse(column, cell, "is later than the year 2100: the unit is smaller");
+      return refuse(column, cell, "is later than the year 2100: choose a smaller unit");
     if (!part) return refuse(column, cell, "is no time");
     sum_us += *part;
   }

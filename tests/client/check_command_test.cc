@@ -180,10 +180,25 @@ TEST_F(CheckCommand, RestartedTimesAreMissions) {
       "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"}}})");
   EXPECT_EQ(check({file("run.csv", csv), "--mapping", how, "--json"}), Exit::warned);
   EXPECT_THAT(printed_, HasSubstr("line 202: the time goes back by 9.95 s: a new mission begins"));
-  EXPECT_THAT(printed_, HasSubstr("line 402 is the last of 2 at which a mission begins so"));
+  EXPECT_THAT(printed_, HasSubstr("the time goes back at 2 lines, the last one line 402"));
   EXPECT_THAT(printed_, ::testing::Not(HasSubstr("gap")));
   EXPECT_THAT(printed_, HasSubstr("no row has a value of battery_voltage"));
   EXPECT_THAT(printed_, HasSubstr("no row has a value of battery_current"));
+}
+
+TEST_F(CheckCommand, ReportsOverlappingDatedTables) {
+  const auto dated = [](int minute) {
+    std::string csv = "t,r,l\n";
+    for (int k = 0; k < 300; ++k)
+      csv += fmt::format("2026-03-02T08:{:02}:{:02}Z,{},1\n", minute + k / 60, k % 60, k);
+    return csv;
+  };
+  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t"},
+      "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
+  const std::string first = file("a.csv", dated(0));
+  EXPECT_EQ(check({first, file("b.csv", dated(10)), "--mapping", how}), Exit::warned);
+  EXPECT_EQ(check({first, file("c.csv", dated(3)), "--mapping", how}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("clock"));
 }
 
 TEST_F(CheckCommand, ReportsRowsOutOfOrder) {

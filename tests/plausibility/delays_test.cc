@@ -32,12 +32,14 @@ TEST_P(AtRate, FindsDelayBetweenRows) {
   for (const double delay : {0.0, 0.07, 0.21}) {
     const auto mission = drive(delay, GetParam(), 11);
     const Lags lags({&mission, 1});
-    const auto found = lags.delay(Late::current_right);
-    ASSERT_TRUE(found);
-    EXPECT_NEAR(found->value_s, delay, std::max(0.02, 0.4 / GetParam()));  // slow rows resolve less
-    EXPECT_LE(found->interval[0], found->value_s);
-    EXPECT_GE(found->interval[1], found->value_s);
-    EXPECT_LT(found->interval[1] - found->interval[0], 0.08);
+    for (const Late current : {Late::current_right, Late::current_left}) {
+      const auto found = lags.delay(current);
+      ASSERT_TRUE(found);
+      EXPECT_NEAR(found->value_s, delay, std::max(0.02, 0.4 / GetParam()));  // slow rows resolve less
+      EXPECT_LE(found->interval[0], found->value_s);
+      EXPECT_GE(found->interval[1], found->value_s);
+      EXPECT_LT(found->interval[1] - found->interval[0], 0.08);
+    }
     const auto gyro = lags.delay(Late::yaw_rate);
     ASSERT_TRUE(gyro);
     EXPECT_NEAR(gyro->value_s, 0, 0.005);

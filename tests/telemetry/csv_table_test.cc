@@ -48,6 +48,11 @@ TEST(CsvTable, ReadsQuotedFields) {
 
 TEST(CsvTable, ErrorsNameLine) {
   EXPECT_THAT(read_all("").error, ::testing::HasSubstr("line 1"));
+  EXPECT_THAT(read_all(std::string("\x7f"
+                                   "ELF\0\1",
+                                   6))
+                  .error,
+              ::testing::HasSubstr("line 1: the header has zero bytes"));
   EXPECT_THAT(read_all("a,b\n1,2\n1,2,3\n").error,
               ::testing::HasSubstr("line 3: has 3 fields, the header 2"));
   EXPECT_THAT(read_all("a,b\n\"1\n2\",\"open\n").error,

@@ -58,7 +58,9 @@ async function main() {
   const request = JSON.parse(process.argv[2]);
   const answer = await convert(request).catch(({ option, message }) => ({ field: option, message }));
   // Of a failed call of the system.
-  answer.message = answer.message?.replace(/E[A-Z]+: (.*), \w+ '.*'$/, 'cannot be opened: $1');
+  answer.message = answer.message?.replace(/E[A-Z]+: (.*), \w+ '(.*)'$/, (_, why, file) =>
+    file === answer.field ? `cannot be opened: ${why}` : `'${file}' cannot be opened: ${why}`,
+  );
   await writeFile(path.join(request.out, 'answer.json'), JSON.stringify(answer));
 }
 main();

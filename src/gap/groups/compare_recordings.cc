@@ -88,7 +88,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   for (const Window& w : data.windows) ++count[data.group[w.mission]];
   for (std::size_t k = 0; k < count.size(); ++k) {
     if (count[k] < min_group_windows)
-      return invalid("log", "holds too little motion in group " + c.groups[k].name);
+      return invalid("log", "contains too little motion of group " + c.groups[k].name);
   }
   if (!data.power && !data.motors && !data.voltages)
     return invalid("log", "measures neither power nor voltage nor current of the motors");

@@ -310,8 +310,8 @@ const Table<Diagnosis>& diagnosis_table() {
           .later()
           .number_or_null(
               "verdict_probability", &D::verdict_probability,
-              "probability of none, effects or outside, averaged over resampled blocks; of the other "
-              "verdicts that of the most probable effect")
+              "probability of the verdicts none, effects and outside, averaged over resampled blocks; of "
+              "the other verdicts no probability of the verdict")
           .later()
           .texts("reasons", &D::reasons, "evidence against a stronger verdict")
           .later()

@@ -204,18 +204,18 @@ std::string missing_data(const Diagnosis& d, bool motion_known) {
         "shorter or have too few readings, their checks exclude it, or no wheel turns faster than {} rad/s.",
         windows::moving_rad_s);
   if (d.power != PowerSource::none) return "There are too few seconds of motion with power.";
-  std::string excluded;
+  std::vector<std::string> excluded;
   for (const Check& check : d.checks)
     if ((check.contradicted || check.id == "impossible_readings") && check.channel != "wheel_velocity" &&
-        excluded.find(check.channel) == std::string::npos)
-      excluded += (excluded.empty() ? "" : ", ") + check.channel;
+        std::ranges::find(excluded, check.channel) == excluded.end())
+      excluded.push_back(check.channel);
   if (excluded.empty())
     return "Neither power nor the motors' voltage or current was recorded: a diagnosis needs battery_voltage "
            "with battery_current, or motor_voltage, or motor_current.";
   return fmt::format(
       "No power is left without the readings of {}, which the checks exclude: compare their unit and the "
       "robot file with the robot.",
-      excluded);
+      enumerate(excluded, "and"));
 }
 
 }  // namespace joulecast::gap

@@ -75,7 +75,8 @@ std::vector<Region> ranges_of(std::span<const Window> windows,
   return ranges;
 }
 
-// Squares of a part `1 / count` of the visited extent; empty where they would not be larger than `least_m`.
+// Squares with a side of 1 / count of the visited extent; empty where they would not be larger than
+// `least_m`.
 std::vector<Region> squares_of(std::span<const Window> windows, int count, double least_m, double& side_m) {
   std::vector<double> x, y;
   for (const Window& w : windows)
