@@ -191,7 +191,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
     how.start_utime_us.reset();
     auto imports = import_table(table, mapping, how);
     // Missions without a date follow each other.
-    if (imports && imports->front().recording.samples.front().utime_us < telemetry::year_2000_utime_us) {
+    if (!imports || imports->front().recording.samples.front().utime_us < telemetry::year_2000_utime_us) {
       how.start_utime_us = next_start_utime_us;
       imports = import_table(table, mapping, how);
     }

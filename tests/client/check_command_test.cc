@@ -193,7 +193,7 @@ TEST_F(CheckCommand, ReportsOverlappingDatedTables) {
       csv += fmt::format("2026-03-02T08:{:02}:{:02}Z,{},1\n", minute + k / 60, k % 60, k);
     return csv;
   };
-  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t"},
+  const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "iso8601"},
       "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
   const std::string first = file("a.csv", dated(0));
   EXPECT_EQ(check({first, file("b.csv", dated(10)), "--mapping", how}), Exit::warned);
