@@ -1,10 +1,10 @@
-#include "plausibility/evidence.h"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "plausibility/evidence.h"
 
 namespace joulecast::plausibility {
 namespace {
