@@ -453,8 +453,8 @@ TEST(WrongFile, ClaimsNothingAboutPayloads) {
       testing::PipelineHarness harness;
       harness.add_robot(wrong);
       drive_missions(harness, robot);
-      for (const auto& c : harness.fleet.find(wrong.robot_id)->contradictions)
-        EXPECT_NE(c.id, "payload_scale") << c.says;
+      const auto now = harness.fleet.find(wrong.robot_id);
+      for (const auto& c : now->contradictions) EXPECT_NE(c.id, "payload_scale") << c.says;
       const auto events = *harness.store->events(0, 100);
       for (const history::Event& event : events)
         EXPECT_NE(event.kind, "undeclared_payload") << event.detail_json;

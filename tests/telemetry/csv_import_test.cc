@@ -908,7 +908,8 @@ TEST(ImportSamples, CountersOfTwelveBitsAreNoted) {
                                 wraps + R"(}, {"column": "l"}]}})");
   };
   EXPECT_THAT(with("")[0].report.notes, ::testing::Contains(HasSubstr("\"wraps_at\" corrects a counter")));
-  for (const signals::Sample& sample : with(R"(, "wraps_at": 4096)")[0].recording.samples)
+  const auto corrected = with(R"(, "wraps_at": 4096)");
+  for (const signals::Sample& sample : corrected[0].recording.samples)
     EXPECT_NEAR(sample.wheel_velocity_rad_s[0], 50, 1e-6);
 }
 
