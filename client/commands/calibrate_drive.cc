@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -99,15 +98,12 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   const std::string& robot_id = robot.robot_id;
   LogProgress progress("reading", options.logs);
   TRY_ASSIGN(auto log, telemetry::read_recordings(options.logs, robot_id, progress.observer()));
+  TRY(telemetry::need_robot(log, robot_id));
   std::vector<telemetry::Recording>& all = log.recordings;
   // Telemetry between missions is used only if the robot declares no missions.
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
-  if (all.empty())
-    return invalid("log", log.robots.contains(robot_id)
-                              ? fmt::format("contains no usable telemetry of {} in a mission", robot_id)
-                              : fmt::format("contains no telemetry of {}, only of {}", robot_id,
-                                            fmt::join(log.robots, ", ")));
+  if (all.empty()) return invalid("log", "contains no usable telemetry of " + robot_id + " in a mission");
   for (telemetry::Recording& r : all) {
     if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
   }

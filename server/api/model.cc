@@ -104,7 +104,7 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
     fitted_on = std::move(diagnosis.fitted_on);
     // The effects found apply to the model that was diagnosed; another one may contain some of them already.
-    if (!adoption.expected_version && !r.force) adoption.expected_version = diagnosis.model_version;
+    if (!r.expected_version && !r.force) adoption.diagnosed_version = diagnosis.model_version;
   } else {
     TRY_ASSIGN(history::Proposal proposal, services.store.proposal(*r.proposal_id));
     if (proposal.state != history::ProposalState::open)
@@ -194,18 +194,12 @@ Result<Response> post_model(Services& services, const Request& request) {
         {id, adoption.adopted, version, adoption.previous_version, adoption.back_test_json}));
   };
   RequestChange change(services, request);
-  Result<server::Adoption> adoption = services.adoption.adopt(
+  const Result<server::Adoption> adoption = services.adoption.adopt(
       wanted, [&request] { return !request.stop.stop_requested(); },
       [&](const server::Adoption& about_to) {
         return change.answered_by(
             [answer, about_to](std::int64_t version) { return answer(about_to, version); });
       });
-  // The diagnosis expects the version that it is about.
-  if (!adoption && adoption.error().field == "/expected_version" && !read.expected_version) {
-    adoption.error().field = "/diagnosis_id";
-    adoption.error().message = "the diagnosis is about another model: " + adoption.error().message +
-                               "; set force to adopt it anyway";
-  }
   if (adoption && !adoption->adopted && !read.dry_run) return refused(request, *adoption);
   if (adoption && !adoption->adopted) return answer(*adoption, adoption->version);
   return change.result(adoption.map(&server::Adoption::version));

@@ -147,10 +147,15 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   if (before == nullptr)
     return fail(Fault::not_found, "id",
                 "robot " + robot_id + " has no model to test a new one against: add its robot file");
-  if (request.expected_version && *request.expected_version != before->version)
-    return fail(Fault::conflict, "/expected_version",
-                "version " + std::to_string(before->version) + " is in force, not " +
-                    std::to_string(*request.expected_version));
+  const auto in_force_not = [&](std::int64_t version) {
+    return "version " + std::to_string(before->version) + " is in force, not " + std::to_string(version);
+  };
+  if (const auto& version = request.expected_version; version && *version != before->version)
+    return fail(Fault::conflict, "/expected_version", in_force_not(*version));
+  if (const auto& version = request.diagnosed_version; version && *version != before->version)
+    return fail(
+        Fault::conflict, "/diagnosis_id",
+        "the diagnosis is about another model: " + in_force_not(*version) + "; set force to adopt it anyway");
   TRY(robot::validate(request.model));
 
   Adoption adoption;

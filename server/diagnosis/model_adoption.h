@@ -33,7 +33,8 @@ struct AdoptionRequest {
   // since the fit describes the robot as of then, and those before its last change of consumption, when
   // enough came after it.
   std::optional<std::int64_t> since_utime_us;
-  std::optional<std::int64_t> expected_version;  // conflict when another one is in force
+  // Conflict when another one is in force: as the request states, and of the model that was diagnosed.
+  std::optional<std::int64_t> expected_version, diagnosed_version;
   std::optional<std::int64_t> diagnosis_id,
       proposal_id;         // its source; an adopted proposal is closed
   std::string overridden;  // why the diagnosis refuses adoption, where it is forced; else empty

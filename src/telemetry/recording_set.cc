@@ -115,12 +115,17 @@ Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Record
                                       none, fastest_hz));
 }
 
-Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
-                                     const LogObserver& passed) {
-  TRY_ASSIGN(LogRecordings log, read_recordings(paths, robot_id, passed));
+Result<void> need_robot(const LogRecordings& log, const std::string& robot_id) {
   if (log.robots.empty()) return invalid("log", "contains no telemetry");
   if (!robot_id.empty() && !log.robots.contains(robot_id))
     return invalid("log", "contains no telemetry of " + robot_id + ", only of " + listed(log.robots));
+  return {};
+}
+
+Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
+                                     const LogObserver& passed) {
+  TRY_ASSIGN(LogRecordings log, read_recordings(paths, robot_id, passed));
+  TRY(need_robot(log, robot_id));
   if (robot_id.empty() && log.robots.size() > 1) {
     return invalid("log", fmt::format("contains {} robots, {}; select one with --robot-id", log.robots.size(),
                                       listed(log.robots)));

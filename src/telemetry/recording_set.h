@@ -29,6 +29,9 @@ inline constexpr double shortest_mission_s = 5.0;
 // " (in mA?)": the probable unit of a field's readings that are outside the range of all robots; empty: none.
 std::string in_other_unit(std::string_view field, double value);
 
+// Fault::invalid where no message of the logs is of the robot, or of any where `robot_id` is empty.
+Result<void> need_robot(const LogRecordings& log, const std::string& robot_id);
+
 // The missions of one robot in event logs (read_recordings). Where several robots are recorded, `robot_id`
 // picks one; empty: the logs must hold one robot only. Errors of read_recordings, and Fault::invalid without
 // a usable mission.
