@@ -22,7 +22,7 @@ template <class Values>
 void BasicDriveModel<S>::apply(std::span<const ActiveEffect> effects, Values&& values_of) {
   for (std::size_t k = 0; k < effects.size(); ++k) {
     const EffectValues<S> values = values_of(k);
-    if (effects[k].effect->adjusts()) effects[k].effect->adjust(values, parameters_);
+    effects[k].effect->adjust(values, parameters_);
     if (effects[k].effect->loads()) loads_.push_back({effects[k].effect, values});
   }
 }

@@ -79,16 +79,15 @@ template <class S>
 using EffectValues = std::array<S, max_effect_parameters>;
 
 // A physical effect that the nominal model leaves out. Implementations are in effects/: a struct
-// with a static `info` and whichever of these static templates it needs:
-//   adjust(values, Parameters<S>&)                      changes constants
-//   load(values, const LoadContext<S>&, Loads<S>&)      adds torque at the wheels
-// Both are instantiated for double and for Dual, so that every derivative is exact.
+// with a static `info` and whichever of these static templates it needs, for S double and Dual, so that every
+// derivative is exact:
+//   adjust(EffectValues<S>, Parameters<S>&)                          changes constants
+//   load(EffectValues<S>, const LoadContext<S>&, Loads<S>&)          adds torque at the wheels
 class Effect {
  public:
   virtual ~Effect() = default;
   virtual const EffectInfo& info() const = 0;
-  virtual bool adjusts() const = 0;
-  virtual bool loads() const = 0;
+  virtual bool loads() const = 0;  // load() adds torque
   virtual void adjust(const EffectValues<double>&, Parameters<double>&) const = 0;
   virtual void adjust(const EffectValues<Dual>&, Parameters<Dual>&) const = 0;
   virtual void load(const EffectValues<double>&, const LoadContext<double>&, Loads<double>&) const = 0;
@@ -109,7 +108,6 @@ class EffectOf final : public Effect {
 
  public:
   const EffectInfo& info() const override { return E::info; }
-  bool adjusts() const override { return has_adjust; }
   bool loads() const override { return has_load; }
   void adjust(const EffectValues<double>& a, Parameters<double>& p) const override { adjust_any(a, p); }
   void adjust(const EffectValues<Dual>& a, Parameters<Dual>& p) const override { adjust_any(a, p); }

@@ -5,8 +5,7 @@
 namespace joulecast::dynamics {
 
 struct AccessoryLoad {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"power_w", "W", 0, -2000, 20000, "extra constant power"}});
+  static constexpr EffectParameter parameters[] = {{"power_w", "W", 0, -2000, 20000, "extra constant power"}};
   static constexpr EffectInfo info{
       "accessory_load",
       ActsOn::battery_side,
@@ -15,15 +14,11 @@ struct AccessoryLoad {
       "Mei et al., Deployment of mobile robots with energy and timing constraints, 2006",
       parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.accessory_power_w += a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.accessory_power_w += a[0]; }
 };
 
 struct DriverLoss {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"fraction", "1", 0, 0, 1, "of the absolute motor power"}});
+  static constexpr EffectParameter parameters[] = {{"fraction", "1", 0, 0, 1, "of the absolute motor power"}};
   static constexpr EffectInfo info{"driver_loss",
                                    ActsOn::battery_side,
                                    "P + a |V i| for each motor",
@@ -31,15 +26,12 @@ struct DriverLoss {
                                    "Mohan, Undeland and Robbins, Power Electronics, ch. 2",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.driver_loss += a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.driver_loss += a[0]; }
 };
 
 struct NoRegeneration {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"fraction", "1", 0, 0, 1, "of the braking power that is not returned"}});
+  static constexpr EffectParameter parameters[] = {
+      {"fraction", "1", 0, 0, 1, "of the braking power that is not returned"}};
   static constexpr EffectInfo info{"no_regeneration",
                                    ActsOn::battery_side,
                                    "braking power of each motor reaches the battery as (1 - a)",
@@ -47,15 +39,12 @@ struct NoRegeneration {
                                    "the thesis returns all of it, (2-46)",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.unreturned += a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.unreturned += a[0]; }
 };
 
 struct BatteryResistance {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.9, 20, "error of the internal resistance over its nominal value"}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -0.9, 20, "error of the internal resistance over its nominal value"}};
   static constexpr EffectInfo info{"battery_resistance",
                                    ActsOn::battery_side,
                                    "V_t = V_oc - (1 + a) R_b i",
@@ -63,10 +52,7 @@ struct BatteryResistance {
                                    "Plett, Battery Management Systems I, ch. 2",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.battery_resistance_ohm *= S(1) + a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.battery_resistance_ohm *= 1.0 + a[0]; }
 };
 
 }  // namespace joulecast::dynamics

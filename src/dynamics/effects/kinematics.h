@@ -5,8 +5,8 @@
 namespace joulecast::dynamics {
 
 struct WheelRadiusError {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.6, 1.5, "error of both radii over the nominal one"}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -0.6, 1.5, "error of both radii over the nominal one"}};
   static constexpr EffectInfo info{
       "wheel_radius_error",
       ActsOn::kinematics,
@@ -15,15 +15,14 @@ struct WheelRadiusError {
       "Borenstein and Feng, Measurement and correction of systematic odometry errors, 1996",
       parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    for (S& radius : p.wheel_radius_m) radius *= S(1) + a[0];
+  static void adjust(const auto& a, auto& p) {
+    for (auto& radius : p.wheel_radius_m) radius *= 1.0 + a[0];
   }
 };
 
 struct WheelRadiusAsymmetry {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.5, 0.5, "difference of the radii over the nominal one"}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -0.5, 0.5, "difference of the radii over the nominal one"}};
   static constexpr EffectInfo info{"wheel_radius_asymmetry",
                                    ActsOn::kinematics,
                                    "r_right (1 + a/2), r_left (1 - a/2)",
@@ -31,16 +30,15 @@ struct WheelRadiusAsymmetry {
                                    "Borenstein and Feng 1996, E_d",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.wheel_radius_m[0] *= S(1) + a[0] * 0.5;
-    p.wheel_radius_m[1] *= S(1) - a[0] * 0.5;
+  static void adjust(const auto& a, auto& p) {
+    p.wheel_radius_m[0] *= 1.0 + a[0] * 0.5;
+    p.wheel_radius_m[1] *= 1.0 - a[0] * 0.5;
   }
 };
 
 struct TrackError {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.7, 2, "error of the track over its nominal value"}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -0.7, 2, "error of the track over its nominal value"}};
   static constexpr EffectInfo info{"track_error",
                                    ActsOn::kinematics,
                                    "l (1 + a)",
@@ -48,15 +46,12 @@ struct TrackError {
                                    "Borenstein and Feng 1996, E_b",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.half_track_m *= S(1) + a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.half_track_m *= 1.0 + a[0]; }
 };
 
 struct WheelSlip {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"slip", "1", 0, -0.2, 0.8, "part of the wheel travel that moves nothing"}});
+  static constexpr EffectParameter parameters[] = {
+      {"slip", "1", 0, -0.2, 0.8, "part of the wheel travel that moves nothing"}};
   static constexpr EffectInfo info{"wheel_slip",
                                    ActsOn::kinematics,
                                    "v = (1 - a) r w",
@@ -64,10 +59,7 @@ struct WheelSlip {
                                    "Wong, Theory of Ground Vehicles, section 1.3",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.slip += a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.slip += a[0]; }
 };
 
 }  // namespace joulecast::dynamics

@@ -5,10 +5,10 @@
 namespace joulecast::dynamics {
 
 // Common to the gains of current and of voltage sensors.
-inline constexpr std::array sensor_gain_parameters =
-    std::to_array<EffectParameter>({{"gain", "1", 0, -0.5, 0.5, "error of the reading"},
-                                    {"motors", "1", 1, 0, 1, "share that the motor sensors have of it"},
-                                    {"battery", "1", 1, 0, 1, "share that the battery sensor has of it"}});
+inline constexpr EffectParameter sensor_gain_parameters[] = {
+    {"gain", "1", 0, -0.5, 0.5, "error of the reading"},
+    {"motors", "1", 1, 0, 1, "share that the motor sensors have of it"},
+    {"battery", "1", 1, 0, 1, "share that the battery sensor has of it"}};
 
 constexpr EffectInfo sensor_gain_info(std::string_view id) {
   return {id,
@@ -22,18 +22,17 @@ constexpr EffectInfo sensor_gain_info(std::string_view id) {
 struct CurrentSensorGain {
   static constexpr EffectInfo info = sensor_gain_info("current_sensor_gain");
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
+  static void adjust(const auto& a, auto& p) {
     p.motor_current.gain += a[0] * a[1];
     p.battery_current.gain += a[0] * a[2];
   }
 };
 
 struct CurrentSensorBias {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"bias_a", "A", 0, -20, 20, "error of the reading"},
-                                      {"motors", "1", 1, 0, 1, "share that the motor sensors have of it"},
-                                      {"battery", "1", 1, 0, 1, "share that the battery sensor has of it"}});
+  static constexpr EffectParameter parameters[] = {
+      {"bias_a", "A", 0, -20, 20, "error of the reading"},
+      {"motors", "1", 1, 0, 1, "share that the motor sensors have of it"},
+      {"battery", "1", 1, 0, 1, "share that the battery sensor has of it"}};
   static constexpr EffectInfo info{"current_sensor_bias",
                                    ActsOn::sensors,
                                    "reading = truth + a",
@@ -41,8 +40,7 @@ struct CurrentSensorBias {
                                    "ISO/IEC Guide 98-3 (GUM), systematic effects",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
+  static void adjust(const auto& a, auto& p) {
     p.motor_current.bias += a[0] * a[1];
     p.battery_current.bias += a[0] * a[2];
   }
@@ -51,16 +49,15 @@ struct CurrentSensorBias {
 struct VoltageSensorGain {
   static constexpr EffectInfo info = sensor_gain_info("voltage_sensor_gain");
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
+  static void adjust(const auto& a, auto& p) {
     p.motor_voltage.gain += a[0] * a[1];
     p.battery_voltage.gain += a[0] * a[2];
   }
 };
 
 struct SensorDelay {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"delay_s", "s", 0, -0.5, 0.5, "by which electrical channels lag the encoders"}});
+  static constexpr EffectParameter parameters[] = {
+      {"delay_s", "s", 0, -0.5, 0.5, "by which electrical channels lag the encoders"}};
   static constexpr EffectInfo info{"sensor_delay",
                                    ActsOn::sensors,
                                    "electrical reading(t) = truth(t - a)",
@@ -68,10 +65,7 @@ struct SensorDelay {
                                    "Ljung, System Identification, section 14.5",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.sensor_delay_s += a[0];
-  }
+  static void adjust(const auto& a, auto& p) { p.sensor_delay_s += a[0]; }
 };
 
 }  // namespace joulecast::dynamics

@@ -6,40 +6,38 @@
 namespace joulecast::dynamics {
 
 struct CoulombFriction {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.9, 20, "extra internal dry friction over the nominal T_m of each side"},
-       {"extra_nm", "N m", 0, -1000, 10000, "extra internal dry friction of each side, beside that", true}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -0.9, 20, "extra internal dry friction over the nominal T_m of each side"},
+      {"extra_nm", "N m", 0, -1000, 10000, "extra internal dry friction of each side, beside that", true}};
   static constexpr EffectInfo info{
       "coulomb_friction",      ActsOn::wheel_torque, "T = ((1 + a) T_m + b) sgn(w)",
       "any speed above creep", "thesis (2-32), T_m", parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    for (S& torque : p.friction_torque_nm) torque = torque * (S(1) + a[0]) + a[1];
+  static void adjust(const auto& a, auto& p) {
+    for (auto& torque : p.friction_torque_nm) torque = torque * (1.0 + a[0]) + a[1];
   }
 };
 
 struct ViscousFriction {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -1, 200, "extra viscous friction over the nominal nu"},
-       {"extra_nm_s_rad", "N m s/rad", 0, -100, 1000, "extra viscous friction of each side, beside that",
-        true}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -1, 200, "extra viscous friction over the nominal nu"},
+      {"extra_nm_s_rad", "N m s/rad", 0, -100, 1000, "extra viscous friction of each side, beside that",
+       true}};
   static constexpr EffectInfo info{"viscous_friction",       ActsOn::wheel_torque,
                                    "T = ((1 + a) nu + b) w", "lubricated gears and bearings",
                                    "thesis (2-32), nu",      parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.viscous_friction_nm_s_rad = p.viscous_friction_nm_s_rad * (S(1) + a[0]) + a[1];
+  static void adjust(const auto& a, auto& p) {
+    p.viscous_friction_nm_s_rad = p.viscous_friction_nm_s_rad * (1.0 + a[0]) + a[1];
   }
 };
 
 struct StribeckFriction {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, 0, 20,
-        "breakaway friction above T_m, over T_m with coulomb_friction and friction_asymmetry"},
-       {"speed_rad_s", "rad/s", 2, 0.2, 100, "Stribeck speed of the wheel"},
-       {"exponent", "1", 2, 1, 2, "of the speed in the exponential"}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, 0, 20,
+       "breakaway friction above T_m, over T_m with coulomb_friction and friction_asymmetry"},
+      {"speed_rad_s", "rad/s", 2, 0.2, 100, "Stribeck speed of the wheel"},
+      {"exponent", "1", 2, 1, 2, "of the speed in the exponential"}};
   static constexpr EffectInfo info{"stribeck_friction",
                                    ActsOn::wheel_torque,
                                    "T = a T_m exp(-|w/w_s|^d) sgn(w)",
@@ -47,10 +45,9 @@ struct StribeckFriction {
                                    "Armstrong-Helouvry, Control of Machines with Friction, 1991, ch. 2",
                                    parameters};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
+  static void load(const auto& a, const auto& c, auto& loads) {
     for (std::size_t s : {0u, 1u}) {
-      const S x = S(c.at.wheel_speed_rad_s[s]) / a[1];
+      const auto x = c.at.wheel_speed_rad_s[s] / a[1];
       loads.wheel(Load::internal, s,
                   a[0] * c.parameters.friction_torque_nm[s] * stribeck_curve(x, a[2]) * c.direction[s]);
     }
@@ -58,9 +55,9 @@ struct StribeckFriction {
 };
 
 struct FrictionAsymmetry {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"ratio", "1", 0, -0.9, 20, "extra dry friction of that side over its T_m, coulomb_friction included"},
-       {"side", "1", 0, 0, 1, "0 right, 1 left"}});
+  static constexpr EffectParameter parameters[] = {
+      {"ratio", "1", 0, -0.9, 20, "extra dry friction of that side over its T_m, coulomb_friction included"},
+      {"side", "1", 0, 0, 1, "0 right, 1 left"}};
   static constexpr EffectInfo info{"friction_asymmetry",
                                    ActsOn::wheel_torque,
                                    "T = (1 + a) T_m sgn(w) on one side only",
@@ -68,15 +65,14 @@ struct FrictionAsymmetry {
                                    "thesis section 3.1: T_m differs between the sides",
                                    parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
-    p.friction_torque_nm[value_of(a[1]) < 0.5 ? 0 : 1] *= S(1) + a[0];
+  static void adjust(const auto& a, auto& p) {
+    p.friction_torque_nm[value_of(a[1]) < 0.5 ? 0 : 1] *= 1.0 + a[0];
   }
 };
 
 struct LoadRollingResistance {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"coefficient", "1", 0, 0, 0.3, "rolling resistance of the payload weight"}});
+  static constexpr EffectParameter parameters[] = {
+      {"coefficient", "1", 0, 0, 0.3, "rolling resistance of the payload weight"}};
   static constexpr EffectInfo info{
       "load_rolling_resistance",
       ActsOn::wheel_torque,
@@ -85,8 +81,7 @@ struct LoadRollingResistance {
       "thesis (1-3), F_r = m g f_r; tables 3-3 and 3-4 show that T_m grows with payload",
       parameters};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
+  static void load(const auto& a, const auto& c, auto& loads) {
     for (std::size_t s : {0u, 1u})
       loads.wheel(Load::rolling, s,
                   a[0] * c.payload_weight_n * c.parameters.wheel_radius_m[s] * 0.5 * c.direction[s]);
@@ -94,11 +89,11 @@ struct LoadRollingResistance {
 };
 
 struct FloorResistanceZone {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"coefficient", "1", 0, 0, 0.5, "extra rolling resistance inside"},
-                                      {"x_m", "m", 0, -1000, 1000, "centre"},
-                                      {"y_m", "m", 0, -1000, 1000, "centre"},
-                                      {"radius_m", "m", 3, 0.2, 1000, "radius"}});
+  static constexpr EffectParameter parameters[] = {
+      {"coefficient", "1", 0, 0, 0.5, "extra rolling resistance inside"},
+      {"x_m", "m", 0, -1000, 1000, "centre"},
+      {"y_m", "m", 0, -1000, 1000, "centre"},
+      {"radius_m", "m", 3, 0.2, 1000, "radius"}};
   static constexpr EffectInfo info{
       "floor_resistance_zone",
       ActsOn::wheel_torque,
@@ -109,8 +104,7 @@ struct FloorResistanceZone {
       true,
       false};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
+  static void load(const auto& a, const auto& c, auto& loads) {
     const double dx = c.at.x_m - value_of(a[1]), dy = c.at.y_m - value_of(a[2]), radius = value_of(a[3]);
     if (!(dx * dx + dy * dy <= radius * radius)) return;  // also when the position is unknown
     for (std::size_t s : {0u, 1u})
@@ -119,9 +113,9 @@ struct FloorResistanceZone {
 };
 
 struct Slope {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"angle_rad", "rad", 0, 0, 0.3, "tilt of the floor"},
-                                      {"uphill_rad", "rad", 0, -7, 7, "heading in which the floor rises"}});
+  static constexpr EffectParameter parameters[] = {
+      {"angle_rad", "rad", 0, 0, 0.3, "tilt of the floor"},
+      {"uphill_rad", "rad", 0, -7, 7, "heading in which the floor rises"}};
   static constexpr EffectInfo info{"slope",
                                    ActsOn::wheel_torque,
                                    "F = m g sin(a) cos(heading - b)",
@@ -131,17 +125,16 @@ struct Slope {
                                    false,
                                    true};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
+  static void load(const auto& a, const auto& c, auto& loads) {
     if (!std::isfinite(c.at.heading_rad)) return;
-    c.force(loads, Load::potential, c.weight_n * sin(a[0]) * cos(S(c.at.heading_rad) - a[1]));
+    c.force(loads, Load::potential, c.weight_n * sin(a[0]) * cos(c.at.heading_rad - a[1]));
   }
 };
 
 struct Grade {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"share", "1", 0, 0, 2, "of the climb's force that counts; 1: the whole of it"},
-       {"zero_rad", "rad", 0, -0.2, 0.2, "added to the climb: by how much the pitch reads low"}});
+  static constexpr EffectParameter parameters[] = {
+      {"share", "1", 0, 0, 2, "of the climb's force that counts; 1: the whole of it"},
+      {"zero_rad", "rad", 0, -0.2, 0.2, "added to the climb: by how much the pitch reads low"}};
   static constexpr EffectInfo info{"grade",
                                    ActsOn::wheel_torque,
                                    "F = a m g sin(climb + b)",
@@ -152,30 +145,28 @@ struct Grade {
                                    false,
                                    true};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
+  static void load(const auto& a, const auto& c, auto& loads) {
     if (!std::isfinite(c.at.climb_rad)) return;
-    c.force(loads, Load::potential, a[0] * c.weight_n * sin(S(c.at.climb_rad) + a[1]));
+    c.force(loads, Load::potential, a[0] * c.weight_n * sin(c.at.climb_rad + a[1]));
   }
 };
 
 struct AerodynamicDrag {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"coefficient_n_s2_m2", "N s^2/m^2", 0, 0, 1000, "drag over speed squared"}});
+  static constexpr EffectParameter parameters[] = {
+      {"coefficient_n_s2_m2", "N s^2/m^2", 0, 0, 1000, "drag over speed squared"}};
   static constexpr EffectInfo info{"aerodynamic_drag", ActsOn::wheel_torque, "F = a v |v|, a = rho A C / 2",
                                    "still air",        "thesis (1-3), F_a",  parameters};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
-    const S v = c.body.speed_m_s;
+  static void load(const auto& a, const auto& c, auto& loads) {
+    const auto v = c.body.speed_m_s;
     c.force(loads, Load::drag, a[0] * v * abs(v));
   }
 };
 
 struct TurningScrub {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"coefficient", "1", 0, 0, 3, "friction coefficient of the twisting contacts"},
-       {"rate_rad_s", "rad/s", 0.02, 0.001, 2, "yaw rate at which the moment has built up"}});
+  static constexpr EffectParameter parameters[] = {
+      {"coefficient", "1", 0, 0, 3, "friction coefficient of the twisting contacts"},
+      {"rate_rad_s", "rad/s", 0.02, 0.001, 2, "yaw rate at which the moment has built up"}};
   static constexpr EffectInfo info{
       "turning_scrub",
       ActsOn::wheel_torque,
@@ -184,19 +175,18 @@ struct TurningScrub {
       "Morales et al., Power analysis for a skid-steered tracked mobile robot, 2006",
       parameters};
 
-  template <class S>
-  static void load(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& loads) {
+  static void load(const auto& a, const auto& c, auto& loads) {
     c.moment(loads, Load::scrub,
              a[0] * c.weight_n * c.parameters.half_track_m * 0.5 * tanh(c.body.yaw_rate_rad_s / a[1]));
   }
 };
 
 struct GearEfficiency {
-  static constexpr std::array parameters =
-      std::to_array<EffectParameter>({{"loss", "1", 0, 0, 0.9, "fraction of the transmitted torque lost"},
-                                      {"of_friction", "1", 0, 0, 1,
-                                       "share of T_m and viscous friction that the gear passes on: 0 where "
-                                       "they act at the motor, 1 where at the wheel"}});
+  static constexpr EffectParameter parameters[] = {
+      {"loss", "1", 0, 0, 0.9, "fraction of the transmitted torque lost"},
+      {"of_friction", "1", 0, 0, 1,
+       "share of T_m and viscous friction that the gear passes on: 0 where "
+       "they act at the motor, 1 where at the wheel"}};
   static constexpr EffectInfo info{
       "gear_efficiency",
       ActsOn::wheel_torque,
@@ -205,8 +195,7 @@ struct GearEfficiency {
       "Giberti, Cinquemani and Legnani, Effects of transmission mechanical characteristics, 2010",
       parameters};
 
-  template <class S>
-  static void adjust(const EffectValues<S>& a, Parameters<S>& p) {
+  static void adjust(const auto& a, auto& p) {
     p.gear_loss += a[0];
     p.gear_friction_share = a[1];
   }
