@@ -18,7 +18,7 @@ constexpr double most_deviation = 0.1;
 // Of a mission's findings. NaN: its motion does not show the parameter.
 double found_over_model(const nlohmann::json& findings, energy::Unknown unknown) {
   const nlohmann::json::json_pointer at(
-      "/parameters/" + std::string(energy::unknown_names[static_cast<std::size_t>(unknown)]));
+      "/parameters/" + std::string(energy::refined_names[static_cast<std::size_t>(unknown)]));
   if (!findings.is_object() || !findings.contains(at)) return signals::unmeasured;
   const nlohmann::json& found = findings[at];
   const double in_force = number_at(found, "in_force");

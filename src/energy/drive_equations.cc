@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "base/try.h"
@@ -21,64 +22,37 @@ constexpr std::size_t index(Unknown unknown) {
   return static_cast<std::size_t>(unknown);
 }
 
-// Changes a robot by `step` in one unknown.
-robot::RobotModel varied(robot::RobotModel robot, Unknown unknown, double step) {
-  const auto effect = [&](const char* id, std::vector<std::pair<std::string, double>> parameters) {
-    robot.effects.push_back({id, std::move(parameters)});
-  };
-  switch (unknown) {
-    case Unknown::friction_right:
-      robot.motor.friction_torque_nm[robot::right] += step;
-      break;
-    case Unknown::friction_left:
-      robot.motor.friction_torque_nm[robot::left] += step;
-      break;
-    case Unknown::viscous:
-      robot.motor.viscous_friction_nm_s_rad += step;
-      break;
-    case Unknown::idle_power:
-      robot.idle_power_w += step;
-      break;
-    case Unknown::mass:
-      robot.mass.chassis_kg += step;
-      break;
-    case Unknown::slope_cos:
-      effect("slope", {{"angle_rad", step}, {"uphill_rad", 0}});
-      break;
-    case Unknown::slope_sin:
-      effect("slope", {{"angle_rad", step}, {"uphill_rad", std::numbers::pi / 2}});
-      break;
-    case Unknown::scrub:
-      effect("turning_scrub", {{"coefficient", step}});
-      break;
-    case Unknown::yaw_inertia:
-      effect("yaw_inertia_error", {{"ratio", step}});
-      break;
-    case Unknown::battery_resistance:
-    case Unknown::current_bias:
-    case Unknown::driver_loss:
-      break;
-  }
-  return robot;
-}
-
 }  // namespace
 
 Result<DriveEquations> DriveEquations::make(const robot::RobotModel& robot) {
   TRY_ASSIGN(auto model, dynamics::drive_model(robot));
   DriveEquations equations(robot, std::move(model));
-  const std::pair<Unknown, double> steps[] = {{Unknown::friction_right, 0.01},
-                                              {Unknown::friction_left, 0.01},
-                                              {Unknown::viscous, 1e-3},
-                                              {Unknown::idle_power, 1},
-                                              {Unknown::mass, 0.01 * robot.mass.chassis_kg},
-                                              {Unknown::slope_cos, 1e-3},
-                                              {Unknown::slope_sin, 1e-3},
-                                              {Unknown::scrub, 1e-2},
-                                              {Unknown::yaw_inertia, 1e-2}};
-  for (const auto& [unknown, step] : steps) {
-    TRY_ASSIGN(auto changed, dynamics::drive_model(varied(robot, unknown, step)));
+  const auto add = [&](Unknown unknown, double step, const robot::RobotModel& varied) -> Result<void> {
+    TRY_ASSIGN(auto changed, dynamics::drive_model(varied));
     equations.varied_.push_back({index(unknown), step, std::move(changed)});
+    return {};
+  };
+  robot::RobotModel varied = robot;
+  const std::tuple<Unknown, double, double*> parameters[] = {
+      {Unknown::friction_right, 0.01, &varied.motor.friction_torque_nm[robot::right]},
+      {Unknown::friction_left, 0.01, &varied.motor.friction_torque_nm[robot::left]},
+      {Unknown::viscous, 1e-3, &varied.motor.viscous_friction_nm_s_rad},
+      {Unknown::idle_power, 1, &varied.idle_power_w},
+      {Unknown::mass, 0.01 * robot.mass.chassis_kg, &varied.mass.chassis_kg}};
+  for (const auto& [unknown, step, value] : parameters) {
+    const double own = std::exchange(*value, *value + step);
+    TRY(add(unknown, step, varied));
+    *value = own;
+  }
+  const std::pair<Unknown, robot::AdoptedEffect> effects[] = {
+      {Unknown::slope_cos, {"slope", {{"angle_rad", 1e-3}, {"uphill_rad", 0}}}},
+      {Unknown::slope_sin, {"slope", {{"angle_rad", 1e-3}, {"uphill_rad", std::numbers::pi / 2}}}},
+      {Unknown::scrub, {"turning_scrub", {{"coefficient", 1e-2}}}},
+      {Unknown::yaw_inertia, {"yaw_inertia_error", {{"ratio", 1e-2}}}}};
+  for (const auto& [unknown, effect] : effects) {
+    varied.effects.push_back(effect);
+    TRY(add(unknown, effect.parameters.front().second, varied));
+    varied.effects.pop_back();
   }
   return equations;
 }

@@ -33,18 +33,12 @@ enum class Unknown : std::size_t {
 inline constexpr std::size_t unknown_count = 12;
 inline constexpr std::size_t refined_count = 6;  // to battery_resistance: kept from mission to mission
 
-inline constexpr std::array<std::string_view, unknown_count> unknown_names = {"friction_torque_right_nm",
+inline constexpr std::array<std::string_view, refined_count> refined_names = {"friction_torque_right_nm",
                                                                               "friction_torque_left_nm",
                                                                               "viscous_friction_nm_s_rad",
                                                                               "idle_power_w",
                                                                               "mass_kg",
-                                                                              "internal_resistance_ohm",
-                                                                              "slope_cos_rad",
-                                                                              "slope_sin_rad",
-                                                                              "scrub",
-                                                                              "yaw_inertia",
-                                                                              "current_bias_a",
-                                                                              "driver_loss"};
+                                                                              "internal_resistance_ohm"};
 
 // Linear equations of one mission: reading - model = row . (unknowns - the model's).
 struct DriveEquation {

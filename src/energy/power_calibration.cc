@@ -3,11 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <bitset>
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "base/try.h"
@@ -19,12 +17,13 @@ namespace {
 
 using Use = std::function<bool(std::size_t block)>;
 
-using PowerFree = std::bitset<power_parameter_count>;
+using PowerFree = Eigen::Array<bool, PowerParameter::count, 1>;
+const PowerFree all_free = PowerFree::Constant(true);
 
 // The parameters with the least residual of the battery's power, in units of PowerParameters.
 struct PowerFit {
-  Eigen::VectorXd x;
-  Eigen::VectorXd deviation;    // standard, of every parameter that the file does not hold, fitted or not
+  PowerVector x;
+  PowerVector deviation;        // standard, of every parameter that the file does not hold, fitted or not
   Eigen::MatrixXd information;  // of the data alone, correlated windows counted for less
   double inflation = 1;         // of the variance, since errors of neighbouring windows are correlated
   double spread_w = 0;          // robust, of the residuals of moving windows
@@ -35,21 +34,24 @@ constexpr double settled = 1e-3;  // of a parameter's expected deviation
 constexpr double first_damping = 1e-3, most_damping = 1e4;
 constexpr double least_spread = 2e-3;        // of the mean power: keeps the weights of exact data finite
 constexpr std::size_t fewest_to_class = 20;  // windows that have a spread of their own
-constexpr auto parameter_count = static_cast<Eigen::Index>(power_parameter_count);
 
 // Measured less modelled power of the windows in use.
 class Misfit {
  public:
   Misfit(const PowerParameters& parameters, const PowerWindows& data, const Use& use)
       : parameters_(parameters) {
-    for (std::size_t k = 0; k < data.windows.size(); ++k)
-      if (data.whole[k] && use(data.windows[k].block)) windows_.push_back(&data.windows[k]);
+    for (std::size_t k = 0; k < data.windows.size(); ++k) {
+      if (!data.whole[k] || !use(data.windows[k].block)) continue;
+      windows_.push_back(&data.windows[k]);
+      blocks_.push_back(data.windows[k].block);
+    }
   }
 
   Eigen::Index rows() const { return static_cast<Eigen::Index>(windows_.size()); }
   const windows::Window& window(Eigen::Index k) const { return *windows_[static_cast<std::size_t>(k)]; }
+  const std::vector<std::size_t>& blocks() const { return blocks_; }  // of the rows
 
-  Eigen::VectorXd left(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd left(const PowerVector& x) const {
     const dynamics::DriveModel model = parameters_.model(x);
     Eigen::VectorXd e(rows());
     for (Eigen::Index k = 0; k < e.size(); ++k)
@@ -58,12 +60,12 @@ class Misfit {
   }
 
   // Derivatives of the model by each parameter [W], by finite differences from the residuals at x.
-  Eigen::MatrixXd slopes(const Eigen::VectorXd& x, const Eigen::VectorXd& here) const {
+  Eigen::MatrixXd slopes(const PowerVector& x, const Eigen::VectorXd& here) const {
     constexpr double step = 1e-4;
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(rows(), parameter_count);
-    for (Eigen::Index p = 0; p < parameter_count; ++p) {
-      if (!(parameters_.expected(static_cast<PowerParameter>(p)) > 0)) continue;
-      Eigen::VectorXd up = x;
+    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(rows(), PowerParameter::count);
+    for (Eigen::Index p = 0; p < PowerParameter::count; ++p) {
+      if (!(parameters_.expected(p) > 0)) continue;
+      PowerVector up = x;
       up[p] += step;
       j.col(p) = (here - left(up)) / step;
     }
@@ -73,6 +75,7 @@ class Misfit {
  private:
   const PowerParameters& parameters_;
   std::vector<const windows::Window*> windows_;
+  std::vector<std::size_t> blocks_;
 };
 
 struct Weights {
@@ -125,21 +128,6 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g,
   return step;
 }
 
-// Sums of scores over blocks, a row each, about their mean.
-Eigen::MatrixXd scores(const Misfit& misfit, const Eigen::MatrixXd& weighted, const Eigen::VectorXd& left) {
-  std::map<std::size_t, Eigen::VectorXd> by_block;
-  for (Eigen::Index k = 0; k < left.size(); ++k) {
-    auto& sum =
-        by_block.try_emplace(misfit.window(k).block, Eigen::VectorXd::Zero(parameter_count)).first->second;
-    sum += left[k] * weighted.row(k).transpose();
-  }
-  Eigen::MatrixXd all(static_cast<Eigen::Index>(by_block.size()), parameter_count);
-  Eigen::Index row = 0;
-  for (const auto& [block, score] : by_block) all.row(row++) = score.transpose();
-  all.rowwise() -= all.colwise().mean().eval();
-  return all;
-}
-
 struct Linear {
   Eigen::MatrixXd weighted;  // slopes by the spread of each row
   Eigen::VectorXd left;      // residuals, weighted likewise
@@ -147,17 +135,19 @@ struct Linear {
   double inflation = 1;
 };
 
-Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::VectorXd& x,
+Linear linearise(const Misfit& misfit, const Weights& weights, const PowerVector& x,
                  const Eigen::VectorXd& left) {
   Linear l;
   l.weighted = weights.of_row.asDiagonal() * misfit.slopes(x, left);
   l.left = weights.of_row.cwiseProduct(left);
   l.information = l.weighted.transpose() * l.weighted;
-  const Eigen::MatrixXd score = scores(misfit, l.weighted, l.left);
+  // Sums of scores over blocks, about their mean.
+  Eigen::MatrixXd score = statistics::block_sums(l.left.asDiagonal() * l.weighted, misfit.blocks());
+  score.rowwise() -= score.colwise().mean().eval();
   const auto blocks = static_cast<double>(score.rows());
   l.scatter = (blocks > 1 ? blocks / (blocks - 1) : 1) * score.transpose() * score;
   std::vector<double> ratios;
-  for (Eigen::Index p = 0; p < parameter_count; ++p)
+  for (Eigen::Index p = 0; p < PowerParameter::count; ++p)
     if (l.information(p, p) > 0) ratios.push_back(l.scatter(p, p) / l.information(p, p));
   // The median: idle power that drifts from mission to mission does not show how well friction is identified.
   if (!ratios.empty()) l.inflation = std::max(1.0, statistics::median(std::move(ratios)));
@@ -169,14 +159,14 @@ void judge(const PowerParameters& parameters, const Linear& l, PowerFit& fit) {
   fit.inflation = l.inflation;
   fit.information = l.information / l.inflation;
   std::vector<Eigen::Index> known;
-  for (Eigen::Index p = 0; p < parameter_count; ++p)
-    if (parameters.expected(static_cast<PowerParameter>(p)) > 0) known.push_back(p);
+  for (Eigen::Index p = 0; p < PowerParameter::count; ++p)
+    if (parameters.expected(p) > 0) known.push_back(p);
   const auto n = static_cast<Eigen::Index>(known.size());
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(n, n);
   const Eigen::MatrixXd covariance = (fit.information(known, known) + prior).inverse();
   const Eigen::MatrixXd middle = l.scatter(known, known) / (l.inflation * l.inflation) + prior;
   const Eigen::MatrixXd own = covariance * middle * covariance;
-  fit.deviation = Eigen::VectorXd::Zero(parameter_count);
+  fit.deviation.setZero();
   for (Eigen::Index k = 0; k < n; ++k)
     fit.deviation[known[static_cast<std::size_t>(k)]] = std::sqrt(std::max(covariance(k, k), own(k, k)));
 }
@@ -186,29 +176,28 @@ class Descent {
  public:
   Descent(const PowerParameters& parameters, const Misfit& misfit, const PowerFree& free, double power_w)
       : misfit_(misfit), power_w_(power_w) {
-    for (std::size_t p = 0; p < power_parameter_count; ++p)
-      if (free[p] && parameters.expected(static_cast<PowerParameter>(p)) > 0)
-        moved_.push_back(static_cast<Eigen::Index>(p));
+    for (Eigen::Index p = 0; p < PowerParameter::count; ++p)
+      if (free[p] && parameters.expected(p) > 0) moved_.push_back(p);
     const auto n = static_cast<Eigen::Index>(moved_.size());
     least_.resize(n), most_.resize(n);
     for (Eigen::Index k = 0; k < n; ++k) {
-      const auto p = static_cast<PowerParameter>(moved_[static_cast<std::size_t>(k)]);
+      const Eigen::Index p = moved_[static_cast<std::size_t>(k)];
       least_[k] = parameters.least(p), most_[k] = parameters.most(p);
     }
   }
 
-  Eigen::VectorXd within(Eigen::VectorXd x) const {
+  PowerVector within(PowerVector x) const {
     x(moved_) = x(moved_).cwiseMax(least_).cwiseMin(most_).eval();
     return x;
   }
 
   // Moves x; false on convergence.
-  bool step(Eigen::VectorXd& x) {
+  bool step(PowerVector& x) {
     const Eigen::VectorXd left = misfit_.left(x);
     const Weights weights = weigh(misfit_, left, power_w_);
     const Linear l = linearise(misfit_, weights, x, left);
     const Eigen::VectorXd start = x(moved_);
-    const auto worth = [&](const Eigen::VectorXd& at) {
+    const auto worth = [&](const PowerVector& at) {
       return weights.of_row.cwiseProduct(misfit_.left(at)).squaredNorm() / l.inflation +
              at(moved_).squaredNorm();
     };
@@ -220,7 +209,7 @@ class Descent {
       damped.diagonal() *= 1 + damping_;
       damped.diagonal().array() += 1;
       const Eigen::VectorXd moved = bounded_step(damped, g, least_ - start, most_ - start);
-      Eigen::VectorXd next = x;
+      PowerVector next = x;
       next(moved_) = start + moved;
       if (!(worth(next) < before)) continue;
       x = next;
@@ -249,7 +238,7 @@ class Descent {
 // its own scores. Parameters that are not fitted widen the others' deviations by their own uncertainty.
 // Fault::invalid without windows.
 Result<PowerFit> fit_power(const PowerParameters& parameters, const PowerWindows& data, const Use& use,
-                           const PowerFree& free, const Eigen::VectorXd& start) {
+                           const PowerFree& free, const PowerVector& start) {
   const Misfit misfit(parameters, data, use);
   if (misfit.rows() == 0)
     return invalid("log", "contains no window with battery power in which wheels keep moving or still");
@@ -269,42 +258,18 @@ constexpr double told_deviation = 0.5;  // of the expected deviation
 // it another parameter interferes.
 constexpr double own_information = 3;
 
-constexpr std::array<std::string_view, power_parameter_count> not_in_the_motion{
-    "power barely differs from zero",
-    "the robot barely moves",
-    "both wheels turn alike, so that only the sum of their frictions counts",
-    "the robot barely moves, or always at one speed",
-    "the speed changes too little",
-    "the rate of turning changes too little",
-    "it changes only the copper loss, which is too small",
-    "the robot barely turns",
-    "the motors' power barely differs from that of friction and inertia",
-    "the motors barely brake"};
-
-constexpr std::array<std::string_view, power_parameter_count> meanings{
-    "computers, drivers and all other loads at rest",
-    "",
-    "",
-    "",
-    "m r^2/2 + I_w + I_s; rotors: the part that the file's mass does not explain",
-    "2 I c^2 + I_w + I_s",
-    "from the copper loss alone, as resistance / torque constant^2",
-    "effect, adopted",
-    "effect, adopted",
-    "effect, adopted"};
-
 // The parameter that most reduces the variance of `p` when it is fixed; `p` itself where none does.
-PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+Eigen::Index in_the_way(const PowerParameters& parameters, const PowerFit& fit, Eigen::Index p) {
   Eigen::MatrixXd precision = fit.information;
   precision.diagonal().array() += 1;
-  const auto variance = [&](PowerParameter known) {
+  const auto variance = [&](Eigen::Index known) {
     Eigen::MatrixXd with = precision;
-    if (known != p) with(index_of(known), index_of(known)) += 1e9;
-    return with.inverse()(index_of(p), index_of(p));
+    if (known != p) with(known, known) += 1e9;
+    return with.inverse()(p, p);
   };
-  PowerParameter most = p;
+  Eigen::Index most = p;
   double least = variance(p);
-  for (const PowerParameter other : all_power_parameters) {
+  for (Eigen::Index other = 0; other < PowerParameter::count; ++other) {
     if (other == p || !(parameters.expected(other) > 0) || !(variance(other) < 0.9 * least)) continue;
     least = variance(other);
     most = other;
@@ -312,19 +277,16 @@ PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit
   return most;
 }
 
-std::string why(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
-  const auto at = static_cast<std::size_t>(p);
-  const Eigen::Index k = index_of(p);
-  if (!(fit.information(k, k) > own_information)) return std::string(not_in_the_motion[at]);
-  const PowerParameter other = in_the_way(parameters, fit, p);
+std::string why(const PowerParameters& parameters, const PowerFit& fit, Eigen::Index p) {
+  if (!(fit.information(p, p) > own_information)) return std::string(parameter_at(p).not_in_the_motion);
+  const Eigen::Index other = in_the_way(parameters, fit, p);
   if (other == p) return "several others together change power in the same way in this motion";
-  return std::string(power_parameter_names[static_cast<std::size_t>(other)]) +
-         " changes power in nearly the same way in this motion";
+  return std::string(parameter_at(other).name) + " changes power in nearly the same way in this motion";
 }
 
 // True if the data identify a parameter: they at least halve its expected deviation.
-bool is_identified(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
-  return parameters.expected(p) > 0 && fit.deviation[index_of(p)] < told_deviation;
+bool is_identified(const PowerParameters& parameters, const PowerFit& fit, Eigen::Index p) {
+  return parameters.expected(p) > 0 && fit.deviation[p] < told_deviation;
 }
 
 // Every parameter with its value, standard error and meaning. An effect that was dropped is listed where the
@@ -332,19 +294,20 @@ bool is_identified(const PowerParameters& parameters, const PowerFit& fit, Power
 std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
                                                const PowerFree& free) {
   std::vector<ParameterEstimate> estimates;
-  for (const PowerParameter p : all_power_parameters) {
-    const auto at = static_cast<std::size_t>(p);
+  for (Eigen::Index p = 0; p < PowerParameter::count; ++p) {
+    const PowerParameter& own = parameter_at(p);
     const bool known = !(parameters.expected(p) > 0), seen = is_identified(parameters, fit, p);
-    if (is_effect(p) && !seen && !free[at]) continue;
-    ParameterEstimate e{power_parameter_names[at],
-                        power_parameter_units[at],
+    const bool dropped = p >= PowerParameter::turning_scrub && !free[p];
+    if (dropped && !seen) continue;
+    ParameterEstimate e{own.name,
+                        own.unit,
                         parameters.value(p, fit.x),
-                        parameters.expected(p) * fit.deviation[index_of(p)],
+                        parameters.expected(p) * fit.deviation[p],
                         seen,
-                        std::string(meanings[at])};
+                        std::string(own.meaning)};
     if (known) e.note = "given as known";
     if (!known && !seen) e.note = "not identified: " + why(parameters, fit, p);
-    if (is_effect(p) && !free[at]) e.note = "not detected";
+    if (dropped) e.note = "not detected";
     estimates.push_back(std::move(e));
   }
   return estimates;
@@ -354,10 +317,9 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
 // identifies.
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
   std::vector<Untold> untold;
-  for (const PowerParameter p : all_power_parameters) {
+  for (Eigen::Index p = 0; p < PowerParameter::count; ++p) {
     if (!(parameters.expected(p) > 0) || is_identified(parameters, fit, p)) continue;
-    untold.push_back(
-        {std::string(power_parameter_names[static_cast<std::size_t>(p)]), why(parameters, fit, p)});
+    untold.push_back({std::string(parameter_at(p).name), why(parameters, fit, p)});
   }
   untold.push_back({"torque_constant_nm_a, voltage_constant_v_s_rad",
                     "torque times speed is the same power for any constants; only the copper loss depends on "
@@ -408,18 +370,16 @@ struct Found {
 // a linear regression.
 Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows& data, const Use& use,
                            const robot::RobotModel& robot) {
-  PowerFree free;
-  free.set();
-  const Eigen::VectorXd file = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(power_parameter_count));
-  auto from_file = fit_power(parameters, data, use, free, file);
+  const PowerVector file = PowerVector::Zero();
+  auto from_file = fit_power(parameters, data, use, all_free, file);
   if (!from_file) return from_file;
-  Eigen::VectorXd plain = file;
-  const Eigen::Index friction = index_of(PowerParameter::friction);
+  PowerVector plain = file;
+  constexpr auto friction = PowerParameter::friction;
   plain[friction] = (PlainRegression(windows_of(data, use), robot).copperless_friction_nm() -
-                     parameters.value(PowerParameter::friction, file)) /
-                    parameters.expected(PowerParameter::friction);
-  plain[index_of(PowerParameter::resistance)] = parameters.least(PowerParameter::resistance) / 2;
-  auto from_plain = fit_power(parameters, data, use, free, plain);
+                     parameters.value(friction, file)) /
+                    parameters.expected(friction);
+  plain[PowerParameter::resistance] = parameters.least(PowerParameter::resistance) / 2;
+  auto from_plain = fit_power(parameters, data, use, all_free, plain);
   if (!from_plain) return from_file;
   const bool better = mean_left_w(parameters.model(from_plain->x), data, use) <
                       mean_left_w(parameters.model(from_file->x), data, use);
@@ -429,21 +389,18 @@ Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows
 // Drops insignificant effects, the least significant first, as each changes the others.
 Result<void> drop_effects(const PowerWindows& data, const Use& use, Found& found) {
   for (;;) {
-    std::optional<PowerParameter> weakest;
+    Eigen::Index weakest = -1;
     double least = least_effect_significance;
-    for (const PowerParameter p :
-         {PowerParameter::turning_scrub, PowerParameter::driver_loss, PowerParameter::unreturned}) {
-      const Eigen::Index at = index_of(p);
-      if (!found.free[static_cast<std::size_t>(at)]) continue;
-      const double significance = std::fabs(found.fit.x[at]) / found.fit.deviation[at];
-      if (significance >= least) continue;
+    for (Eigen::Index p = PowerParameter::turning_scrub; p < PowerParameter::count; ++p) {
+      const double significance = std::fabs(found.fit.x[p]) / found.fit.deviation[p];
+      if (!found.free[p] || significance >= least) continue;
       least = significance;
       weakest = p;
     }
-    if (!weakest) return {};
-    found.free.reset(static_cast<std::size_t>(*weakest));
-    Eigen::VectorXd start = found.fit.x;
-    start[index_of(*weakest)] = 0;
+    if (weakest < 0) return {};
+    found.free[weakest] = false;
+    PowerVector start = found.fit.x;
+    start[weakest] = 0;
     TRY_ASSIGN(found.fit, fit_power(found.parameters, data, use, found.free, start));
   }
 }
@@ -460,9 +417,7 @@ Result<Found> find(const PowerParameters& given, const PowerWindows& data, const
     const double left = mean_left_w(parameters.model(fit.x), data, use);
     if (left < least) {
       least = left;
-      PowerFree free;
-      free.set();
-      best = Found{parameters, std::move(fit), free};
+      best = Found{parameters, std::move(fit), all_free};
     }
     if (!parameters.scrub_rate_is_free()) break;
   }
@@ -474,8 +429,7 @@ Result<Found> find(const PowerParameters& given, const PowerWindows& data, const
 // too.
 Result<MissedPower> predict_halves(const PowerParameters& parameters, const PowerWindows& data,
                                    const robot::RobotModel& robot) {
-  const Eigen::VectorXd file = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(power_parameter_count));
-  const dynamics::DriveModel by_file = parameters.model(file);
+  const dynamics::DriveModel by_file = parameters.model(PowerVector::Zero());
   MissedPowerMeter missed;
   for (const bool second : {false, true}) {
     const Use use = [&](std::size_t block) { return (2 * block >= data.blocks) == second; };

@@ -154,11 +154,8 @@ Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, co
   const double friction_nm = (motor.friction_torque_nm[0] + motor.friction_torque_nm[1]) / 2;
   const double torque_nm = std::max(friction_nm, scale.power_w / (2 * scale.speed_rad_s));
   const WheelInertia inertia = wheel_inertia(robot);
-  constexpr auto count = static_cast<Eigen::Index>(power_parameter_count);
-  p.file_.resize(count), p.expected_.resize(count), p.least_.resize(count), p.most_.resize(count);
-  const auto set = [&](PowerParameter which, double file, double expected, double least,
+  const auto set = [&](Eigen::Index at, double file, double expected, double least,
                        double most = std::numeric_limits<double>::infinity()) {
-    const Eigen::Index at = index_of(which);
     p.file_[at] = file, p.expected_[at] = expected, p.least_[at] = least, p.most_[at] = most;
   };
   set(PowerParameter::idle_power, robot.idle_power_w, std::max(robot.idle_power_w, scale.power_w), 0);
@@ -180,7 +177,7 @@ Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, co
                                               std::tuple{PowerParameter::unreturned, file_unreturned, 1.0}}) {
     double had = 0;
     for (const dynamics::ActiveEffect& e : p.adopted_) {
-      if (e.effect->info().id != power_parameter_names[static_cast<std::size_t>(which)]) continue;
+      if (e.effect->info().id != parameter_at(which).name) continue;
       had = e.values[0];
       if (which != PowerParameter::turning_scrub) continue;
       p.file_has_scrub_ = true;
@@ -196,30 +193,20 @@ void PowerParameters::set_scrub_rate(double rate_rad_s) {
   if (scrub_rate_is_free()) scrub_rate_rad_s_ = rate_rad_s;
 }
 
-double PowerParameters::least(PowerParameter p) const {
-  const Eigen::Index at = index_of(p);
-  return expected_[at] > 0 ? (least_[at] - file_[at]) / expected_[at] : 0;
-}
-
-double PowerParameters::most(PowerParameter p) const {
-  const Eigen::Index at = index_of(p);
-  return expected_[at] > 0 ? (most_[at] - file_[at]) / expected_[at] : 0;
-}
-
-std::array<double, 2> PowerParameters::friction_nm(const Eigen::VectorXd& x) const {
+std::array<double, 2> PowerParameters::friction_nm(const PowerVector& x) const {
   const double mean = plain_value(PowerParameter::friction, x),
                half = plain_value(PowerParameter::friction_difference, x) / 2;
   return {std::max(mean + half, 0.0), std::max(mean - half, 0.0)};
 }
 
-double PowerParameters::value(PowerParameter p, const Eigen::VectorXd& x) const {
+double PowerParameters::value(Eigen::Index p, const PowerVector& x) const {
   const std::array<double, 2> side_nm = friction_nm(x);
   if (p == PowerParameter::friction) return (side_nm[0] + side_nm[1]) / 2;
   if (p == PowerParameter::friction_difference) return side_nm[0] - side_nm[1];
   return plain_value(p, x);
 }
 
-robot::RobotModel PowerParameters::without_effects(const Eigen::VectorXd& x) const {
+robot::RobotModel PowerParameters::without_effects(const PowerVector& x) const {
   robot::RobotModel robot = robot_;
   robot.idle_power_w = value(PowerParameter::idle_power, x);
   robot.motor.friction_torque_nm = friction_nm(x);
@@ -231,23 +218,23 @@ robot::RobotModel PowerParameters::without_effects(const Eigen::VectorXd& x) con
   return robot;
 }
 
-std::vector<dynamics::ActiveEffect> PowerParameters::found_effects(const Eigen::VectorXd& x) const {
+std::vector<dynamics::ActiveEffect> PowerParameters::found_effects(const PowerVector& x) const {
   std::vector<dynamics::ActiveEffect> found;
-  for (const PowerParameter p : all_power_parameters) {
-    if (!is_effect(p) || value(p, x) == 0) continue;
-    found.push_back(effect_of(power_parameter_names[static_cast<std::size_t>(p)], value(p, x)));
+  for (Eigen::Index p = PowerParameter::turning_scrub; p < PowerParameter::count; ++p) {
+    if (value(p, x) == 0) continue;
+    found.push_back(effect_of(parameter_at(p).name, value(p, x)));
     if (p == PowerParameter::turning_scrub) found.back().values[1] = scrub_rate_rad_s_;
   }
   return found;
 }
 
-dynamics::DriveModel PowerParameters::model(const Eigen::VectorXd& x) const {
+dynamics::DriveModel PowerParameters::model(const PowerVector& x) const {
   std::vector<dynamics::ActiveEffect> effects = adopted_;
   for (const dynamics::ActiveEffect& e : found_effects(x)) effects.push_back(e);
   return {without_effects(x), effects};
 }
 
-robot::RobotModel PowerParameters::robot(const Eigen::VectorXd& x) const {
+robot::RobotModel PowerParameters::robot(const PowerVector& x) const {
   robot::RobotModel robot = without_effects(x);
   for (const dynamics::ActiveEffect& e : found_effects(x)) {
     robot::AdoptedEffect more = dynamics::adopt(e);

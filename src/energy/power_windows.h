@@ -19,44 +19,46 @@ namespace joulecast::energy {
 
 // Parameters of a drive that battery power and motion may identify, at the wheel. The last three are effects
 // of the catalogue and count beyond the strengths that the robot file has adopted.
-enum class PowerParameter : std::size_t {
-  idle_power,           // W
-  friction,             // N m, mean of both sides
-  friction_difference,  // N m, right less left
-  viscous,              // N m s/rad
-  straight_inertia,     // kg m^2 (wheel_inertia.h)
-  turning_inertia,      // kg m^2 (wheel_inertia.h)
-  resistance,           // ohm, through the copper loss R (T/(K_t n))^2 alone
-  turning_scrub,        // 1, friction coefficient of turning contacts
-  driver_loss,          // 1, of the motors' absolute power
-  unreturned            // 1, of the motors' braking power
+struct PowerParameter {
+  enum : Eigen::Index {
+    idle_power,
+    friction,             // mean of both sides
+    friction_difference,  // right less left
+    viscous,
+    straight_inertia,  // wheel_inertia.h
+    turning_inertia,   // wheel_inertia.h
+    resistance,        // through the copper loss R (T/(K_t n))^2 alone
+    turning_scrub,     // friction coefficient of turning contacts
+    driver_loss,       // of the motors' absolute power
+    unreturned,        // of the motors' braking power
+    count
+  };
+  std::string_view name, unit;
+  std::string_view meaning;
+  std::string_view not_in_the_motion;  // why the data do not identify it
 };
-inline constexpr std::size_t power_parameter_count = 10;
-inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_names{
-    "idle_power_w",
-    "friction_torque_nm mean",
-    "friction_torque_nm right - left",
-    "viscous_friction_nm_s_rad",
-    "straight inertia",
-    "turning inertia",
-    "resistance_ohm",
-    "turning_scrub",
-    "driver_loss",
-    "no_regeneration"};
-inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_units{
-    "W", "N m", "N m", "N m s/rad", "kg m2", "kg m2", "ohm", "1", "1", "1"};
+inline constexpr std::array<PowerParameter, PowerParameter::count> power_parameters{{
+    {"idle_power_w", "W", "computers, drivers and all other loads at rest", "power barely differs from zero"},
+    {"friction_torque_nm mean", "N m", "", "the robot barely moves"},
+    {"friction_torque_nm right - left", "N m", "",
+     "both wheels turn alike, so that only the sum of their frictions counts"},
+    {"viscous_friction_nm_s_rad", "N m s/rad", "", "the robot barely moves, or always at one speed"},
+    {"straight inertia", "kg m2",
+     "m r^2/2 + I_w + I_s; rotors: the part that the file's mass does not explain",
+     "the speed changes too little"},
+    {"turning inertia", "kg m2", "2 I c^2 + I_w + I_s", "the rate of turning changes too little"},
+    {"resistance_ohm", "ohm", "from the copper loss alone, as resistance / torque constant^2",
+     "it changes only the copper loss, which is too small"},
+    {"turning_scrub", "1", "effect, adopted", "the robot barely turns"},
+    {"driver_loss", "1", "effect, adopted",
+     "the motors' power barely differs from that of friction and inertia"},
+    {"no_regeneration", "1", "effect, adopted", "the motors barely brake"},
+}};
 
-inline constexpr auto all_power_parameters = [] {
-  std::array<PowerParameter, power_parameter_count> all{};
-  for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<PowerParameter>(k);
-  return all;
-}();
+using PowerVector = Eigen::Matrix<double, PowerParameter::count, 1>;
 
-constexpr Eigen::Index index_of(PowerParameter p) {
-  return static_cast<Eigen::Index>(p);
-}
-constexpr bool is_effect(PowerParameter p) {
-  return p >= PowerParameter::turning_scrub;
+constexpr const PowerParameter& parameter_at(Eigen::Index p) {
+  return power_parameters[static_cast<std::size_t>(p)];
 }
 
 // Sizes that determine how far a parameter may lie from an incomplete robot file.
@@ -78,28 +80,29 @@ class PowerParameters {
   void set_scrub_rate(double rate_rad_s);
   bool scrub_rate_is_free() const { return !file_has_scrub_; }
 
-  double expected(PowerParameter p) const { return expected_[index_of(p)]; }  // 0: held at the file's
+  double expected(Eigen::Index p) const { return expected_[p]; }  // 0: held at the file's
   // In its own unit. The friction of a side is at least zero for every mean and difference.
-  double value(PowerParameter p, const Eigen::VectorXd& x) const;
-  double least(PowerParameter p) const;  // bounds in units of x
-  double most(PowerParameter p) const;
+  double value(Eigen::Index p, const PowerVector& x) const;
+  double least(Eigen::Index p) const { return in_units(p, least_[p]); }  // bounds in units of x
+  double most(Eigen::Index p) const { return in_units(p, most_[p]); }
 
-  dynamics::DriveModel model(const Eigen::VectorXd& x) const;
+  dynamics::DriveModel model(const PowerVector& x) const;
   // The robot file with these values in it. Effects without strength are left out.
-  robot::RobotModel robot(const Eigen::VectorXd& x) const;
+  robot::RobotModel robot(const PowerVector& x) const;
 
  private:
   explicit PowerParameters(const robot::RobotModel& robot) : robot_(robot) {}
-  double plain_value(PowerParameter p, const Eigen::VectorXd& x) const {
-    return file_[index_of(p)] + expected_[index_of(p)] * x[index_of(p)];
+  double plain_value(Eigen::Index p, const PowerVector& x) const { return file_[p] + expected_[p] * x[p]; }
+  double in_units(Eigen::Index p, double value) const {
+    return expected_[p] > 0 ? (value - file_[p]) / expected_[p] : 0;
   }
-  std::array<double, 2> friction_nm(const Eigen::VectorXd& x) const;
-  robot::RobotModel without_effects(const Eigen::VectorXd& x) const;
-  std::vector<dynamics::ActiveEffect> found_effects(const Eigen::VectorXd& x) const;
+  std::array<double, 2> friction_nm(const PowerVector& x) const;
+  robot::RobotModel without_effects(const PowerVector& x) const;
+  std::vector<dynamics::ActiveEffect> found_effects(const PowerVector& x) const;
 
   robot::RobotModel robot_;
   std::vector<dynamics::ActiveEffect> adopted_;
-  Eigen::VectorXd file_, expected_, least_, most_;
+  PowerVector file_, expected_, least_, most_;
   double scrub_rate_rad_s_ = 0;
   bool file_has_scrub_ = false;
 };

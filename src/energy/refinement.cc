@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
 #include "base/median.h"
+#include "statistics/robust.h"
 
 namespace joulecast::energy {
 namespace {
@@ -22,15 +24,11 @@ using KeptSquare = Eigen::Matrix<double, m, m>;
 constexpr auto mass = static_cast<Eigen::Index>(Unknown::mass);
 
 constexpr std::size_t fewest_equations = 60;
-constexpr std::size_t block = 24;  // equations that err together: about 2.5 s
-constexpr double huber = 2.5;
+constexpr Eigen::Index block = 24;  // equations that err together: about 2.5 s
+constexpr double huber = 2.5, no_bound = std::numeric_limits<double>::infinity();
 constexpr int reweightings = 4;
 constexpr double surprise_memory = 0.1;  // weight of the latest mission in the scatter's factor
 constexpr double least_factor = 0.1, greatest_factor = 30;
-
-Eigen::Map<const ParameterRow> row_of(const DriveEquation& e) {
-  return Eigen::Map<const ParameterRow>(e.row.data());
-}
 
 // Solution of one mission's equations, beyond the model in force, under a Gaussian prior about it.
 struct MissionSolution {
@@ -42,56 +40,43 @@ struct MissionSolution {
 // Robust least squares with a noise level for each kind of equation, taken from the residuals, and covariance
 // by blocks of neighbours, since their errors are correlated.
 MissionSolution solve(std::span<const DriveEquation> equations, const ParameterSquare& prior_precision) {
-  constexpr std::size_t kinds = 4;
-  std::array<double, kinds> noise{};
-  for (std::size_t kind = 0; kind < kinds; ++kind) {
-    double square = 0, count = 0;
-    for (const DriveEquation& e : equations)
-      if (static_cast<std::size_t>(e.kind) == kind) square += e.value * e.value, ++count;
-    noise[kind] = count > 0 ? std::sqrt(square / count) : 0;
+  const auto count = static_cast<Eigen::Index>(equations.size());
+  Eigen::Matrix<double, Eigen::Dynamic, n> x(count, n);
+  Eigen::VectorXd y(count), weight(count);
+  std::map<DriveEquation::Kind, std::vector<Eigen::Index>> of_kind;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const DriveEquation& e = equations[static_cast<std::size_t>(k)];
+    x.row(k) = Eigen::Map<const Eigen::Matrix<double, 1, n>>(e.row.data());
+    y[k] = e.value;
+    of_kind[e.kind].push_back(k);
   }
   MissionSolution out{ParameterRow::Zero(), ParameterSquare::Zero()};
-  std::vector<double> weight(equations.size());
+  Eigen::VectorXd left = y;
   ParameterSquare normal;
   for (int pass = 0; pass < reweightings; ++pass) {
-    normal = prior_precision;
-    ParameterRow target = ParameterRow::Zero();
-    std::array<std::vector<double>, kinds> sizes;
-    for (const DriveEquation& e : equations)
-      sizes[static_cast<std::size_t>(e.kind)].push_back(std::abs(e.value - row_of(e).dot(out.value)));
-    for (std::size_t kind = 0; kind < kinds; ++kind) {
-      const auto& of_kind = sizes[kind];
-      if (of_kind.empty()) continue;
+    for (const auto& [kind, rows] : of_kind) {
+      const Eigen::VectorXd own = left(rows), sizes = own.cwiseAbs();
       // The median of |x| is 0.6745 standard deviations of a normal variable.
-      if (pass > 0) noise[kind] = std::max(upper_median(of_kind) / 0.6745, 1e-9);
-      noise[kind] = std::max(noise[kind], 1e-9);
+      const double noise = pass == 0 ? std::sqrt(own.squaredNorm() / static_cast<double>(rows.size()))
+                                     : upper_median(std::vector(sizes.begin(), sizes.end())) / 0.6745;
+      const double sd = std::max(noise, 1e-9), bound = pass == 0 ? no_bound : huber;
+      for (const Eigen::Index k : rows) weight[k] = statistics::huber_weight(left[k], sd, bound) / (sd * sd);
     }
-    for (std::size_t k = 0; k < equations.size(); ++k) {
-      const DriveEquation& e = equations[k];
-      const double sd = noise[static_cast<std::size_t>(e.kind)];
-      const double size = std::abs(e.value - row_of(e).dot(out.value)) / sd;
-      weight[k] = (pass > 0 && size > huber ? huber / size : 1) / (sd * sd);
-      const ParameterRow r = row_of(e);
-      normal.noalias() += weight[k] * r * r.transpose();
-      target += weight[k] * e.value * r;
-    }
-    out.value = normal.ldlt().solve(target);
+    const Eigen::Matrix<double, n, Eigen::Dynamic> weighted = x.transpose() * weight.asDiagonal();
+    normal = prior_precision + weighted * x;
+    out.value = normal.ldlt().solve(weighted * y);
+    left = y - x * out.value;
   }
   const ParameterSquare inverse = normal.ldlt().solve(ParameterSquare::Identity());
   ParameterSquare meat = prior_precision;
-  ParameterRow sum = ParameterRow::Zero();
-  double square = 0, count = 0;
-  for (std::size_t k = 0; k < equations.size(); ++k) {
-    const DriveEquation& e = equations[k];
-    const double residual = e.value - row_of(e).dot(out.value);
-    sum += weight[k] * residual * row_of(e);
-    if (k % block == block - 1 || k + 1 == equations.size()) {
-      meat.noalias() += sum * sum.transpose();
-      sum.setZero();
-    }
-    if (e.kind == DriveEquation::Kind::torque) square += residual * residual, ++count;
+  for (Eigen::Index k = 0; k < count; k += block) {
+    const Eigen::Index rows = std::min(block, count - k);
+    const ParameterRow score =
+        x.middleRows(k, rows).transpose() * weight.segment(k, rows).cwiseProduct(left.segment(k, rows));
+    meat += score * score.transpose();
   }
-  if (count > 0) out.torque_rms = std::sqrt(square / count);
+  if (const Eigen::VectorXd torques = left(of_kind[DriveEquation::Kind::torque]); torques.size() > 0)
+    out.torque_rms = std::sqrt(torques.squaredNorm() / static_cast<double>(torques.size()));
   // Few blocks underestimate it: at least the deviation by independent errors.
   const ParameterSquare sandwich = inverse * meat * inverse;
   out.covariance = 0.5 * (sandwich + inverse);

@@ -106,7 +106,7 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
                 {"parameters", Json::object()}};
   const auto in_force = energy::refined_values(robot_);
   for (std::size_t k = 0; k < energy::refined_count; ++k)
-    document["parameters"][std::string(energy::unknown_names[k])] = {
+    document["parameters"][std::string(energy::refined_names[k])] = {
         {"value", finding.parameters[k].value}, {"sd", finding.parameters[k].sd}, {"in_force", in_force[k]}};
   out.findings_json = document.dump();
   if (finding.undeclared && !inseparable) {
@@ -183,7 +183,7 @@ std::optional<history::Proposal> RefinementWatch::suggestion() {
   for (std::size_t k = 0; k < energy::refined_count; ++k) {
     if (value[k] == in_force[k]) continue;
     names.append(names.empty() ? "" : ", ").append(words[k].name);
-    detail["parameters"].push_back({{"name", energy::unknown_names[k]},
+    detail["parameters"].push_back({{"name", energy::refined_names[k]},
                                     {"unit", words[k].unit},
                                     {"in_force", in_force[k]},
                                     {"value", value[k]},

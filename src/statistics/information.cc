@@ -1,7 +1,5 @@
 #include "statistics/information.h"
 
-#include <vector>
-
 namespace joulecast::statistics {
 
 Information::Information(Eigen::Index columns)
@@ -25,26 +23,15 @@ Information& Information::operator*=(double factor) {
   return *this;
 }
 
-void Information::add(const Eigen::Ref<const Eigen::MatrixXd>& x,
-                      const Eigen::Ref<const Eigen::VectorXd>& y) {
-  // Eigen's product into a triangle refers to the first coefficient, which an empty matrix has not.
-  if (x.size() > 0) xx.triangularView<Eigen::Lower>() += x.transpose() * x;
-  xx.triangularView<Eigen::StrictlyUpper>() = xx.transpose();
-  xy += x.transpose() * y;
-  yy += y.squaredNorm();
-}
-
 void Information::add(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::VectorXd>& y,
-                      std::span<const std::size_t> columns) {
-  Information part(x.cols());
-  part.add(x, y);
-  for (std::size_t a = 0; a < columns.size(); ++a) {
-    const auto la = static_cast<Eigen::Index>(a), ga = static_cast<Eigen::Index>(columns[a]);
-    xy[ga] += part.xy[la];
-    for (std::size_t b = 0; b < columns.size(); ++b)
-      xx(ga, static_cast<Eigen::Index>(columns[b])) += part.xx(la, static_cast<Eigen::Index>(b));
-  }
-  yy += part.yy;
+                      const std::vector<Eigen::Index>& columns) {
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(x.cols(), x.cols());
+  // Eigen's product into a triangle refers to the first coefficient, which an empty matrix has not.
+  if (x.size() > 0) products.triangularView<Eigen::Lower>() += x.transpose() * x;
+  products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
+  xx(columns, columns) += products;
+  xy(columns) += x.transpose() * y;
+  yy += y.squaredNorm();
 }
 
 void Information::integrate_out(const Eigen::VectorXd& sd) {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <span>
+#include <vector>
 
 namespace joulecast::statistics {
 
@@ -19,11 +19,9 @@ struct Information {
   Information& operator+=(const Information& other);
   Information& operator*=(double factor);
 
-  // Rows with these columns; X'X is kept whole, both triangles.
-  void add(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::VectorXd>& y);
-  // The same where X has only some of the columns, in this order.
+  // Rows with these columns, each once; X'X is kept whole, both triangles.
   void add(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::VectorXd>& y,
-           std::span<const std::size_t> columns);
+           const std::vector<Eigen::Index>& columns);
 
   // Adds to these columns a deviation of this information's own, N(0, sd^2) each, and integrates it out: a
   // random effect of one mission or block. Columns with sd 0 are left alone.

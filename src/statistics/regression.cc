@@ -73,6 +73,15 @@ Eigen::VectorXd signed_solution(const Eigen::MatrixXd& xx, const Eigen::VectorXd
   return unit.cwiseProduct(b);
 }
 
+Eigen::MatrixXd block_sums(const Eigen::MatrixXd& rows, const std::vector<std::size_t>& block) {
+  std::map<std::size_t, std::vector<Eigen::Index>> of_block;
+  for (std::size_t k = 0; k < block.size(); ++k) of_block[block[k]].push_back(static_cast<Eigen::Index>(k));
+  Eigen::MatrixXd sums(static_cast<Eigen::Index>(of_block.size()), rows.cols());
+  for (Eigen::Index next = 0; const auto& [number, own] : of_block)
+    sums.row(next++) = rows(own, Eigen::all).colwise().sum();
+  return sums;
+}
+
 Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
                              const std::vector<std::size_t>& block, const std::vector<bool>& nonnegative) {
   const Eigen::Index n = x.rows(), p = x.cols();
@@ -97,21 +106,14 @@ Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
     weight = huber_weights(e, r.spread);
   }
   // Huber's sandwich, section 7.6; scores summed over blocks: Liang and Zeger 1986.
+  Eigen::MatrixXd scores = weight.cwiseProduct(e).asDiagonal() * scaled;
   const bool one_block = std::ranges::adjacent_find(block, std::ranges::not_equal_to()) == block.end();
-  std::map<std::size_t, Eigen::VectorXd> scores;
-  Eigen::VectorXd inside(n);
-  for (Eigen::Index k = 0; k < n; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    const auto found = scores.try_emplace(one_block ? at : block[at], Eigen::VectorXd::Zero(p)).first;
-    found->second += weight[k] * e[k] * scaled.row(k).transpose();
-    inside[k] = weight[k] < 1 ? 0 : 1;
-  }
-  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
-  for (const auto& [number, score] : scores) middle += score * score.transpose();
-  const auto blocks = static_cast<double>(scores.size());
+  if (!one_block) scores = block_sums(scores, block);
+  const auto blocks = static_cast<double>(scores.rows());
   const double few = blocks > 1 ? blocks / (blocks - 1) : 1.0;
+  const Eigen::VectorXd inside = weight.unaryExpr([](double w) { return w < 1 ? 0.0 : 1.0; });
   const Eigen::MatrixXd bread = inverse(scaled.transpose() * inside.asDiagonal() * scaled);
-  r.sd = (few * (bread * middle * bread).diagonal()).cwiseMax(0.0).cwiseSqrt().cwiseProduct(size);
+  r.sd = (std::sqrt(few) * (scores * bread).colwise().norm()).transpose().cwiseProduct(size);
   r.coefficients = size.asDiagonal() * b;
   r.weight = weight;
   return r;

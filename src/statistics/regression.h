@@ -14,6 +14,9 @@ Eigen::VectorXd huber_weights(const Eigen::VectorXd& residual, double spread);
 Eigen::VectorXd signed_solution(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy,
                                 const std::vector<bool>& nonnegative);
 
+// Sums of rows by block, a row each, in the order of the blocks.
+Eigen::MatrixXd block_sums(const Eigen::MatrixXd& rows, const std::vector<std::size_t>& block);
+
 // A linear regression that is robust to single rows.
 struct Regression {
   Eigen::VectorXd coefficients;

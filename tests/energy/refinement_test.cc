@@ -141,7 +141,7 @@ std::vector<double> departures(const std::vector<History>& all, bool print) {
       z.push_back((h.estimates[k].value - h.truth[k]) / h.estimates[k].sd);
       if (print)
         std::printf("%-6s %-26s true %9.5f refined %9.5f +- %.5f\n", h.kind.c_str(),
-                    std::string(unknown_names[k]).c_str(), h.truth[k], h.estimates[k].value,
+                    std::string(refined_names[k]).c_str(), h.truth[k], h.estimates[k].value,
                     h.estimates[k].sd);
     }
   return z;
@@ -163,7 +163,7 @@ TEST(Refinement, RecoversParametersAndUndeclaredPayloads) {
       if (h.truth[k] > 0) {
         // Twenty missions that scatter by 3 %, the scatter that the trust expects: 1 % and three deviations.
         EXPECT_NEAR(h.estimates[k].value, h.truth[k], 0.025 * h.truth[k])
-            << h.kind << " " << unknown_names[k];
+            << h.kind << " " << refined_names[k];
       }
   for (const History& h : all) {
     const double off_kg = h.estimates[4].value - h.truth[4];
@@ -206,7 +206,7 @@ TEST(Refinement, WrongTrustKeepsConclusions) {
       for (std::size_t k : {0u, 1u, 3u})
         if (h.truth[k] > 0) {
           EXPECT_NEAR(h.estimates[k].value, h.truth[k], 0.03 * h.truth[k])
-              << h.kind << " " << unknown_names[k] << " " << factor;
+              << h.kind << " " << refined_names[k] << " " << factor;
         }
     double square = 0;
     const auto z = departures(all, false);

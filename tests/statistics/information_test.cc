@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 namespace joulecast::statistics {
@@ -21,7 +22,9 @@ Eigen::MatrixXd numbers(Eigen::Index rows, Eigen::Index columns, double seed) {
 
 Information of(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   Information info(x.cols());
-  info.add(x, y);
+  std::vector<Eigen::Index> all(static_cast<std::size_t>(x.cols()));
+  std::iota(all.begin(), all.end(), 0);
+  info.add(x, y, all);
   return info;
 }
 
@@ -45,9 +48,9 @@ TEST(Information, IsProductsOfRows) {
 
 TEST(Information, AcceptsNoRowsOrColumns) {
   Information no_columns(0), no_rows(2);
-  no_columns.add(Eigen::MatrixXd(3, 0), Eigen::Vector3d(1, 2, 2));
+  no_columns.add(Eigen::MatrixXd(3, 0), Eigen::Vector3d(1, 2, 2), {});
   EXPECT_EQ(no_columns.yy, 9);
-  no_rows.add(Eigen::MatrixXd(0, 2), Eigen::VectorXd(0));
+  no_rows.add(Eigen::MatrixXd(0, 2), Eigen::VectorXd(0), {0, 1});
   EXPECT_EQ(no_rows.xx.norm() + no_rows.xy.norm() + no_rows.yy, 0);
 }
 
@@ -58,7 +61,7 @@ TEST(Information, SparseColumnsEqualZeros) {
   whole.col(3) = x.col(0);
   whole.col(1) = x.col(1);
   Information info(5);
-  info.add(x, y, std::vector<std::size_t>{3, 1});
+  info.add(x, y, {3, 1});
   expect_same(info, of(whole, y));
 }
 

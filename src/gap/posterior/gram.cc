@@ -15,12 +15,11 @@ Grams make_grams(const Equations& e, std::span<const Noise> noise, std::size_t b
     std::vector<std::vector<Eigen::Index>> of_block(blocks);
     for (std::size_t k = 0; k < rows.block.size(); ++k) of_block[rows.block[k]].push_back(ix(k));
     const Eigen::VectorXd root = noise[c].weight.cwiseSqrt();
-    const std::vector<std::size_t> columns(rows.columns.begin(), rows.columns.end());
     for (std::size_t b = 0; b < blocks; ++b) {
       if (of_block[b].empty()) continue;
       const Eigen::VectorXd own = root(of_block[b]);
       const Eigen::MatrixXd x = own.asDiagonal() * rows.x(of_block[b], Eigen::all);
-      grams.raw[b].add(x, own.cwiseProduct(rows.y(of_block[b])), columns);
+      grams.raw[b].add(x, own.cwiseProduct(rows.y(of_block[b])), rows.columns);
     }
   }
   Eigen::VectorXd scatter(ix(e.size()));

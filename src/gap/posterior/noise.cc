@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "gap/posterior/constants.h"
+#include "statistics/regression.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap::posterior {
@@ -68,22 +68,17 @@ Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual
 
 // Mean over the columns of the ratio of the scatter of blocks' scores to that of independent rows.
 double block_inflation(const ChannelRows& rows, const Eigen::MatrixXd& scores) {
-  std::map<std::size_t, Eigen::VectorXd> sums;
-  for (Eigen::Index k = 0; k < scores.rows(); ++k) {
-    const auto at = sums.try_emplace(rows.block[ux(k)], Eigen::VectorXd::Zero(scores.cols())).first;
-    at->second += scores.row(k).transpose();
-  }
-  if (sums.size() < fewest_blocks) return 1;
+  const Eigen::MatrixXd sums = statistics::block_sums(scores, rows.block);
+  if (ux(sums.rows()) < fewest_blocks) return 1;
   const Eigen::VectorXd naive = scores.cwiseAbs2().colwise().sum();
-  Eigen::VectorXd clustered = Eigen::VectorXd::Zero(scores.cols());
-  for (const auto& [block, sum] : sums) clustered += sum.cwiseAbs2();
+  const Eigen::VectorXd clustered = sums.cwiseAbs2().colwise().sum();
   double ratio = 0, count = 0;
   for (Eigen::Index j = 0; j < naive.size(); ++j) {
     if (naive[j] <= 1e-12 * naive.maxCoeff()) continue;
     ratio += clustered[j] / naive[j];
     count += 1;
   }
-  const double blocks = static_cast<double>(sums.size());
+  const double blocks = static_cast<double>(sums.rows());
   return count > 0 ? std::max(1.0, ratio / count * blocks / (blocks - 1)) : 1;
 }
 

@@ -151,9 +151,8 @@ statistics::Information expected_information(const posterior::Fit& fit, const st
     const posterior::Noise& noise =
         fit.noise[static_cast<std::size_t>(same - fit.equations.channels.begin())];
     if (!(noise.sigma > 0)) continue;
-    std::vector<std::size_t> columns(rows.columns.begin(), rows.columns.end());
     const double root = 1 / (noise.sigma * std::sqrt(noise.inflation));
-    info.add(root * rows.x, Eigen::VectorXd::Zero(rows.y.size()), columns);
+    info.add(root * rows.x, Eigen::VectorXd::Zero(rows.y.size()), rows.columns);
   }
   return info;
 }
