@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 #include "base/try.h"
@@ -11,16 +13,9 @@
 namespace joulecast::battery {
 namespace {
 
-// State as CVODE carries it.
-enum : std::size_t {
-  charge_at,
-  branch_at,
-  lag_at = branch_at + 2,
-  temperature_at = lag_at + 2,
-  drawn_at,
-  energy_at,
-  size
-};
+// State as CVODE carries it: first its numbers in their order.
+using Numbers = std::array<double, sizeof(State) / sizeof(double)>;
+enum : std::size_t { drawn_at = std::tuple_size_v<Numbers>, energy_at, size };
 
 enum : std::size_t { voltage_event, power_event, event_count };
 
@@ -40,7 +35,9 @@ class Problem final : public energy::InitialValueProblem {
   }
 
   static State unpacked(std::span<const double> y) {
-    return {y[charge_at], {y[branch_at], y[branch_at + 1]}, {y[lag_at], y[lag_at + 1]}, y[temperature_at]};
+    Numbers numbers;
+    std::ranges::copy(y.first<numbers.size()>(), numbers.begin());
+    return std::bit_cast<State>(numbers);
   }
 
   double asked(double t) const {
@@ -58,13 +55,7 @@ class Problem final : public energy::InitialValueProblem {
   void rate(double t, std::span<const double> y, std::span<double> out) override {
     const State state = unpacked(y);
     const double current = current_a(t, state);
-    const State change = circuit_.rate(state, current, ambient_c_);
-    out[charge_at] = change.charge;
-    out[branch_at] = change.branch_current_a[0];
-    out[branch_at + 1] = change.branch_current_a[1];
-    out[lag_at] = change.charge_lag[0];
-    out[lag_at + 1] = change.charge_lag[1];
-    out[temperature_at] = change.temperature_c;
+    std::ranges::copy(std::bit_cast<Numbers>(circuit_.rate(state, current, ambient_c_)), out.begin());
     out[drawn_at] = current / 3600;
     out[energy_at] = current * circuit_.voltage_v(state, current);
   }
@@ -106,12 +97,6 @@ class Problem final : public energy::InitialValueProblem {
   double began_s_ = 0;
 };
 
-bool finite(const State& state) {
-  return std::isfinite(state.charge) && std::isfinite(state.branch_current_a[0]) &&
-         std::isfinite(state.branch_current_a[1]) && std::isfinite(state.surface_charge()) &&
-         std::isfinite(state.temperature_c);
-}
-
 Result<void> check(std::span<const double> time_s, std::span<const double> value) {
   if (time_s.size() != value.size())
     return invalid(
@@ -131,17 +116,14 @@ Result<void> check(std::span<const double> time_s, std::span<const double> value
 
 Result<Discharge> discharge(const Circuit& circuit, const State& start, const Load& load,
                             const DischargeLimits& limits) {
-  if (!finite(start)) return invalid("start", "has a number that is not finite");
+  const auto numbers = std::bit_cast<Numbers>(start);
+  if (!std::ranges::all_of(numbers, [](double v) { return std::isfinite(v); }))
+    return invalid("start", "has a number that is not finite");
   Problem problem(circuit, limits, load.kind);
   energy::Cvode cvode(size, problem);
   const std::span<double> y = cvode.state();
   std::fill(y.begin(), y.end(), 0.0);
-  y[charge_at] = start.charge;
-  y[branch_at] = start.branch_current_a[0];
-  y[branch_at + 1] = start.branch_current_a[1];
-  y[lag_at] = start.charge_lag[0];
-  y[lag_at + 1] = start.charge_lag[1];
-  y[temperature_at] = start.temperature_c;
+  std::ranges::copy(numbers, y.begin());
 
   Discharge out;
   out.voltage_v = circuit.inner_voltage_v(start);
@@ -152,7 +134,7 @@ Result<Discharge> discharge(const Circuit& circuit, const State& start, const Lo
     event = problem.event_at(now_s, y);
     const bool at_once = event.has_value();
     if (!at_once) {
-      TRY_ASSIGN(const auto arrival, cvode.advance_to_event(now_s, now_s + piece.duration_s));
+      TRY_ASSIGN(const auto arrival, cvode.advance(now_s, now_s + piece.duration_s));
       now_s = arrival.time_s;
       event = arrival.event;
     }

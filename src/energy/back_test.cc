@@ -239,8 +239,7 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
   result.improvement_interval = result.power_gap_fall_interval = {ModelError::unknown, ModelError::unknown};
   std::vector<Pair> pairs;
   Random random(20240229);
-  double before_j = 0, after_j = 0, measured_j = 0, gap_before_j = 0, gap_after_j = 0, size_j = 0;
-  double before_v = 0, after_v = 0, size_v = 0;
+  std::array<Span, 2> totals;  // before and after, missed_j without sign
   for (const DriveRun& run : runs) {
     if (settings.go_on && !settings.go_on()) return fail(Fault::conflict, "", "back-test cancelled");
     // The battery's accounts where it was measured for most of the run, else the motors'.
@@ -257,31 +256,31 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
     TRY_ASSIGN(Replay b, replay(second, run, row.at_battery, settings));
     add_voltage(run, before.battery.internal_resistance_ohm, a->bins);
     add_voltage(run, after.battery.internal_resistance_ohm, b.bins);
-    const Span before_run = whole(a->bins), after_run = whole(b.bins);
-    row.measured_j = before_run.measured_j;
+    std::array<Span, 2> sums{whole(a->bins), whole(b.bins)};
+    row.measured_j = sums[0].measured_j;
     if (row.measured_j < settings.least_energy_j) continue;
-    row.before = error_of(before_run);
-    row.after = error_of(after_run);
-    gap_before_j += before_run.gap_j;
-    gap_after_j += after_run.gap_j;
-    size_j += before_run.size_j;
-    before_v += before_run.missed_v;
-    after_v += after_run.missed_v;
-    size_v += before_run.size_v;
-    before_j += std::fabs(before_run.missed_j);
-    after_j += std::fabs(after_run.missed_j);
-    measured_j += row.measured_j;
+    row.before = error_of(sums[0]);
+    row.after = error_of(sums[1]);
+    for (const std::size_t k : {0u, 1u}) {
+      sums[k].missed_j = std::fabs(sums[k].missed_j);
+      totals[k] += sums[k];
+    }
     pairs.push_back({blocks_of(a->bins, settings.block_s), blocks_of(b.bins, settings.block_s),
                      models_differ(a->bins, b.bins)});
     run_intervals(pairs.back(), settings.draws, random, row);
     result.runs.push_back(std::move(row));
   }
   if (pairs.empty()) return result;
-  result.error_before = before_j / measured_j;
-  result.error_after = after_j / measured_j;
-  result.power_gap_before = gap_before_j / size_j;
-  result.power_gap_after = gap_after_j / size_j;
-  if (size_v > 0) result.voltage_gap_before = before_v / size_v, result.voltage_gap_after = after_v / size_v;
+  const auto& [before_all, after_all] = totals;
+  result.error_before = before_all.missed_j / before_all.measured_j;
+  result.error_after = after_all.missed_j / before_all.measured_j;
+  result.power_gap_before = before_all.gap_j / before_all.size_j;
+  result.power_gap_after = after_all.gap_j / before_all.size_j;
+  const double size_v = before_all.size_v;
+  if (size_v > 0) {
+    result.voltage_gap_before = before_all.missed_v / size_v;
+    result.voltage_gap_after = after_all.missed_v / size_v;
+  }
   std::vector<std::size_t> drawable;
   for (std::size_t k = 0; k < pairs.size(); ++k)
     if (pairs[k].differ) drawable.push_back(k);

@@ -101,21 +101,6 @@ struct Cvode::Impl : SundialsProblem {
     return fail(Fault::internal, "cvode",
                 message.empty() ? "failed with flag " + std::to_string(flag) : message);
   }
-
-  // Restarts at t0 and integrates towards t1; the flag distinguishes an event from the end.
-  Result<int> run(double t0, double t1, double& reached) {
-    if (!(t1 > t0)) return invalid("t1", "must be after t0");
-    message.clear();
-    TRY(check(CVodeReInit(memory, t0, y)));
-    TRY(check(CVodeSetStopTime(memory, t1)));
-    reached = t0;
-    const int flag = CVode(memory, t1, y, &reached, CV_NORMAL);
-    TRY(check(flag));
-    if (flag != CV_ROOT_RETURN && reached != t1)
-      return fail(Fault::internal, "cvode",
-                  "stopped at " + std::to_string(reached) + " s, short of its goal");
-    return flag;
-  }
 };
 
 Cvode::Cvode(std::size_t size, InitialValueProblem& problem) : impl_(std::make_unique<Impl>(size, problem)) {}
@@ -125,22 +110,20 @@ std::span<double> Cvode::state() {
   return Impl::values(impl_->y);
 }
 
-Result<void> Cvode::advance(double t0, double t1) {
-  double from = t0;
-  for (;;) {  // events are passed over
-    double reached = from;
-    TRY_ASSIGN(const int flag, impl_->run(from, t1, reached));
-    if (flag != CV_ROOT_RETURN || reached == t1) return {};
-    from = reached;
-  }
-}
-
-Result<Arrival> Cvode::advance_to_event(double t0, double t1) {
+Result<Arrival> Cvode::advance(double t0, double t1) {
+  if (!(t1 > t0)) return invalid("t1", "must be after t0");
+  Impl& of = *impl_;
+  of.message.clear();
+  TRY(of.check(CVodeReInit(of.memory, t0, of.y)));
+  TRY(of.check(CVodeSetStopTime(of.memory, t1)));
   double reached = t0;
-  TRY_ASSIGN(const int flag, impl_->run(t0, t1, reached));
+  const int flag = CVode(of.memory, t1, of.y, &reached, CV_NORMAL);
+  TRY(of.check(flag));
+  if (flag != CV_ROOT_RETURN && reached != t1)
+    return fail(Fault::internal, "cvode", "stopped at " + std::to_string(reached) + " s, short of its goal");
   if (flag != CV_ROOT_RETURN) return Arrival{reached, std::nullopt};
-  std::vector<int> signs(impl_->problem.event_count());
-  CVodeGetRootInfo(impl_->memory, signs.data());
+  std::vector<int> signs(of.problem.event_count());
+  CVodeGetRootInfo(of.memory, signs.data());
   const auto changed = std::find_if(signs.begin(), signs.end(), [](int sign) { return sign != 0; });
   return Arrival{reached, static_cast<std::size_t>(changed - signs.begin())};
 }

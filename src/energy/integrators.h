@@ -17,7 +17,7 @@ class InitialValueProblem {
   virtual void rate(double t, std::span<const double> state, std::span<double> rate) = 0;
   // Error weights 1/tolerance of each state; called at every step.
   virtual void weights(std::span<const double> state, std::span<double> weight) const = 0;
-  // Cvode::advance_to_event() stops where one of these functions changes sign. Their number is fixed at
+  // Cvode::advance() stops where one of these functions changes sign. Their number is fixed at
   // construction.
   virtual std::size_t event_count() const { return 0; }
   virtual void events(double /*t*/, std::span<const double> /*state*/, std::span<double> /*value*/) const {}
@@ -41,13 +41,10 @@ class Cvode {
 
   std::span<double> state();
 
-  // Integrates from `t0` with the present state() to exactly `t1` > t0, restarting the method at t0. The
-  // error carries CVODE's own message.
-  Result<void> advance(double t0, double t1);
-
-  // As advance(), but stops where one of the problem's event functions first changes sign. A function that
-  // is zero at t0 counts from when it has left zero.
-  Result<Arrival> advance_to_event(double t0, double t1);
+  // Integrates from `t0` with the present state() to exactly `t1` > t0, restarting the method at t0, or to
+  // where one of the problem's event functions first changes sign. A function that is zero at t0 counts from
+  // when it has left zero. The error carries CVODE's own message.
+  Result<Arrival> advance(double t0, double t1);
 
   // Bounds every step from now on, for right-hand sides with features that error control could step over;
   // 0 lifts the bound.

@@ -202,26 +202,6 @@ std::size_t Meter::fill_window(std::size_t index) {
   return index - first;
 }
 
-void Meter::book(const Rates& increment, Coverage coverage, double interval_s) {
-  accounts_.battery_j += increment[account::battery];
-  accounts_.measured_j += increment[account::measured];
-  if (coverage.battery) accounts_.measured_s += interval_s;
-  if (coverage.motors) accounts_.motor_measured_s += interval_s;
-  accounts_.modelled_j += increment[account::modelled];
-  for (std::size_t s : {0u, 1u}) {
-    accounts_.measured_motor_j[s] += increment[account::measured_motor + s];
-    accounts_.modelled_motor_j[s] += increment[account::modelled_motor + s];
-  }
-  accounts_.drawn_j += increment[account::drawn];
-  accounts_.returned_j += increment[account::returned];
-  accounts_.charge_ah += increment[account::charge_a] / seconds_per_hour;
-  accounts_.distance_m += increment[account::distance];
-  accounts_.turned_rad += increment[account::turned];
-  accounts_.duration_s += interval_s;
-  for (std::size_t k = 0; k < signals::term_count; ++k)
-    accounts_.ledger.value[k] += increment[account::ledger + k];
-}
-
 Result<void> Meter::integrate_to(const Node& node, double interval_s) {
   Node from = *last_, to = node;
   if (from.coverage != to.coverage || !have_the_same(from.reading.motion, to.reading.motion)) {
@@ -246,7 +226,10 @@ Result<void> Meter::integrate_to(const Node& node, double interval_s) {
     skip_gap(interval_s);
     return fail(Fault::invalid, "model", "the power of the recorded motion is not finite");
   }
-  book(increment, to.coverage, interval_s);
+  book(increment, accounts_);
+  if (to.coverage.battery) accounts_.measured_s += interval_s;
+  if (to.coverage.motors) accounts_.motor_measured_s += interval_s;
+  accounts_.duration_s += interval_s;
   if (!integrated) return tl::unexpected(integrated.error());
   return {};
 }

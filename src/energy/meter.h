@@ -105,7 +105,6 @@ class Meter {
   // True when every sample of the window of waiting_[index] has arrived.
   bool window_complete(std::size_t index) const;
   std::size_t fill_window(std::size_t index);
-  void book(const Rates& increment, Coverage coverage, double interval_s);
   Result<void> integrate_to(const Node& node, double interval_s);
   void skip_gap(double interval_s);
   void describe_state(const Node& node, MeterPoint& point) const;

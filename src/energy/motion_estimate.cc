@@ -126,16 +126,8 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
   }
 
   signals::Accounts a;
-  a.battery_j = y[account::battery];
-  a.modelled_j = y[account::modelled];
-  a.modelled_motor_j = {y[account::modelled_motor], y[account::modelled_motor + 1]};
-  a.drawn_j = y[account::drawn];
-  a.returned_j = y[account::returned];
-  a.charge_ah = y[account::charge_a] / 3600;
-  a.distance_m = y[account::distance];
-  a.turned_rad = y[account::turned];
+  book(y.first<account::count>(), a);
   a.duration_s = points.back().time_s - points.front().time_s;
-  for (std::size_t k = 0; k < signals::term_count; ++k) a.ledger.value[k] = y[account::ledger + k];
   return a;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/units.h"
+
 namespace joulecast::energy {
 namespace {
 
@@ -21,6 +23,22 @@ double lerp_angle(double a, double b, double s) {
 }
 
 }  // namespace
+
+void book(std::span<const double, account::count> increment, signals::Accounts& a) {
+  a.battery_j += increment[account::battery];
+  a.measured_j += increment[account::measured];
+  a.modelled_j += increment[account::modelled];
+  for (std::size_t s : {0u, 1u}) {
+    a.measured_motor_j[s] += increment[account::measured_motor + s];
+    a.modelled_motor_j[s] += increment[account::modelled_motor + s];
+  }
+  a.drawn_j += increment[account::drawn];
+  a.returned_j += increment[account::returned];
+  a.charge_ah += increment[account::charge_a] / seconds_per_hour;
+  a.distance_m += increment[account::distance];
+  a.turned_rad += increment[account::turned];
+  for (std::size_t k = 0; k < signals::term_count; ++k) a.ledger.value[k] += increment[account::ledger + k];
+}
 
 Reading reading_of(const signals::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
                    double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w) {
@@ -63,9 +81,8 @@ Reading between(const Reading& a, const Reading& b, double s) {
 }
 
 Rates rates_at(const dynamics::DriveModel& model, const Reading& reading, Coverage coverage,
-               std::array<double, 2>& copper_w, dynamics::PowerFlow<double>* flow_out) {
+               std::array<double, 2>& copper_w) {
   const dynamics::PowerFlow<double> flow = model.flow(reading.motion);
-  if (flow_out != nullptr) *flow_out = flow;
   const double volts = coverage.battery ? reading.battery_voltage_v : dynamics::unknown;
   const double modelled = model.metered_battery_power(flow.battery_power_w, volts);
   const double measured = reading.battery_voltage_v * reading.battery_current_a;

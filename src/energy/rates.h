@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include "dynamics/drive_model.h"
 #include "signals/ledger.h"
@@ -27,6 +28,9 @@ inline constexpr std::size_t count = ledger + signals::term_count;
 
 using Rates = std::array<double, account::count>;
 
+// Adds integrals of rates to the accounts; their durations are the caller's.
+void book(std::span<const double, account::count> increment, signals::Accounts& accounts);
+
 // Inputs of the rates at one instant; linear in time between samples.
 struct Reading {
   dynamics::Instant motion;
@@ -51,8 +55,8 @@ Reading reading_of(const signals::Sample& sample, const std::array<double, 2>& w
 // between.
 Reading between(const Reading& a, const Reading& b, double s);
 
-// All account rates at one instant. `copper_heat_rate` receives R i^2 of each motor [W].
+// All account rates at one instant. `copper_w` receives R i^2 of each motor [W].
 Rates rates_at(const dynamics::DriveModel& model, const Reading& reading, Coverage coverage,
-               std::array<double, 2>& copper_w, dynamics::PowerFlow<double>* flow_out = nullptr);
+               std::array<double, 2>& copper_w);
 
 }  // namespace joulecast::energy

@@ -40,7 +40,7 @@ TEST(Cvode, RejectsNaN) {
   decay.k = std::numeric_limits<double>::quiet_NaN();
   Cvode cvode(1, decay);
   cvode.state()[0] = 1;
-  const Result<void> done = cvode.advance(0, 1);
+  const auto done = cvode.advance(0, 1);
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().fault, Fault::internal);
   EXPECT_FALSE(done.error().message.empty());
