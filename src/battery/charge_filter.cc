@@ -52,18 +52,17 @@ void isolate(Matrix& p, Eigen::Index k, double variance) {
 
 }  // namespace
 
-ChargeFilter::ChargeFilter(const robot::Battery& battery, const ChargeTrust& trust)
+ChargeFilter::ChargeFilter(const robot::Battery& battery)
     : circuit_(battery),
-      trust_(trust),
       nominal_voltage_v_(battery.nominal_voltage_v),
       curve_sd_v_(battery.nominal_voltage_v *
-                  (battery.open_circuit_voltage.empty() ? trust.default_curve_sd : trust.open_circuit_sd)),
-      shift_sd_(battery.open_circuit_voltage.empty() ? trust.default_shift_sd : trust.curve_shift_sd),
+                  (battery.open_circuit_voltage.empty() ? trust_.default_curve_sd : trust_.open_circuit_sd)),
+      shift_sd_(battery.open_circuit_voltage.empty() ? trust_.default_shift_sd : trust_.curve_shift_sd),
       shift_stays_(battery.open_circuit_voltage.empty()),
       resistance_sd_(battery.resistance_curve.empty() && battery.branches.empty()
-                         ? trust.default_resistance_sd
-                         : trust.resistance_sd),
-      bias_sd_a_(trust.bias_per_h * circuit_.capacity_ah()) {
+                         ? trust_.default_resistance_sd
+                         : trust_.resistance_sd),
+      bias_sd_a_(trust_.bias_per_h * circuit_.capacity_ah()) {
   forget();
 }
 
@@ -298,16 +297,16 @@ void ChargeFilter::gap(double duration_s) {
   const double current_sd_a = trust_.unknown_current_per_h * circuit_.capacity_ah();
   const State after = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
   const State driven = circuit_.advanced({}, current_sd_a, duration_s, temperature_c_);
+  const auto relax = [&](Eigen::Index at, double keep, double variance) {
+    x_[at] *= keep;
+    p_.row(at) *= keep;
+    p_.col(at) *= keep;
+    p_(at, at) += variance;
+  };
   for (Eigen::Index k = 0; k < 2; ++k) {
     const auto b = static_cast<std::size_t>(k);
-    const auto relax = [&](Eigen::Index at, double keep, double sd) {
-      x_[at] *= keep;
-      p_.row(at) *= keep;
-      p_.col(at) *= keep;
-      p_(at, at) += sd * sd;
-    };
-    relax(at_branch + k, after.branch_current_a[b], driven.branch_current_a[b]);
-    relax(at_lag + k, after.charge_lag[b], driven.charge_lag[b]);
+    relax(at_branch + k, after.branch_current_a[b], std::pow(driven.branch_current_a[b], 2));
+    relax(at_lag + k, after.charge_lag[b], std::pow(driven.charge_lag[b], 2));
   }
   const double lost = trust_.unknown_current_per_h * duration_s / seconds_per_hour;
   const double most = trust_.unknown_charge_sd * trust_.unknown_charge_sd;
@@ -316,10 +315,7 @@ void ChargeFilter::gap(double duration_s) {
   // The other states drift as in advance(), without its charge.
   const auto wander = [&](Eigen::Index k, double sd, double memory_s) {
     const double keep = std::exp(-duration_s / memory_s);
-    x_[k] *= keep;
-    p_.row(k) *= keep;
-    p_.col(k) *= keep;
-    p_(k, k) += sd * sd * (1 - keep * keep);
+    relax(k, keep, sd * sd * (1 - keep * keep));
   };
   wander(at_bias, bias_sd_a_, bias_memory_s);
   wander(at_factor, resistance_sd_, resistance_memory_s);

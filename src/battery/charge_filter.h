@@ -46,7 +46,7 @@ class ChargeFilter {
   using Vector = Eigen::Matrix<double, size, 1>;
   using Matrix = Eigen::Matrix<double, size, size>;  // symmetric
 
-  explicit ChargeFilter(const robot::Battery& battery, const ChargeTrust& trust = {});
+  explicit ChargeFilter(const robot::Battery& battery);
 
   // Makes the charge unknown.
   void forget();
@@ -98,7 +98,7 @@ class ChargeFilter {
   double drop_v(const State& state, double current_a, double resistance_factor) const;
 
   Circuit circuit_;
-  ChargeTrust trust_;
+  static constexpr ChargeTrust trust_{};
   double nominal_voltage_v_;
   double curve_sd_v_;
   double shift_sd_;

@@ -7,6 +7,9 @@
 namespace joulecast::battery {
 namespace {
 
+constexpr double update_s = 1;    // readings are averaged over this
+constexpr double gap_s = 15;      // longer silences count as unknown current
+constexpr double flat_sd = 0.15;  // of the charge from one voltage: from here on the curve counts as flat
 constexpr double full_sd = 0.02;  // chargers end at different small currents
 
 }  // namespace
@@ -26,13 +29,8 @@ std::string limitation_of(const ChargeEstimate& estimate) {
                              : "";
 }
 
-ChargeTracker::ChargeTracker(const robot::Battery& battery, double idle_power_w,
-                             const ChargeTrackerSettings& settings, const ChargeTrust& trust)
-    : filter_(battery, trust),
-      settings_(settings),
-      idle_power_w_(idle_power_w),
-      modelled_sd_(trust.modelled_current_sd),
-      default_curve_(battery.open_circuit_voltage.empty()) {
+ChargeTracker::ChargeTracker(const robot::Battery& battery, double idle_power_w)
+    : filter_(battery), idle_power_w_(idle_power_w), default_curve_(battery.open_circuit_voltage.empty()) {
   refresh();
 }
 
@@ -53,7 +51,7 @@ void ChargeTracker::add(const ChargeReading& reading) {
   }
   const double interval_s = static_cast<double>(reading.utime_us - last_->utime_us) * seconds_per_microsecond;
   if (!(interval_s > 0)) return;
-  if (interval_s > settings_.gap_s) {
+  if (interval_s > gap_s) {
     update();
     filter_.gap(interval_s);
     refresh();
@@ -77,13 +75,13 @@ void ChargeTracker::add(const ChargeReading& reading) {
   charge_as_ += current_a * interval_s;
   duration_s_ += interval_s;
   last_ = reading;
-  if (duration_s_ >= settings_.update_s) update();
+  if (duration_s_ >= update_s) update();
 }
 
 void ChargeTracker::update() {
   if (!(duration_s_ > 0)) return;
   const double current_a = charge_as_ / duration_s_;
-  const double current_sd_a = modelled_sd_ * modelled_as_ / duration_s_;
+  const double current_sd_a = ChargeTrust().modelled_current_sd * modelled_as_ / duration_s_;
   filter_.advance(current_a, duration_s_, current_sd_a);
   const bool voltage = voltage_s_ >= 0.5 * duration_s_;
   if (voltage) {
@@ -113,7 +111,7 @@ void ChargeTracker::refresh() {
   out.charge = filter_.charge();
   out.sd = filter_.charge_sd();
   out.source = source_;
-  out.flat_curve = filter_.voltage_only_sd() > settings_.flat_sd;
+  out.flat_curve = filter_.voltage_only_sd() > flat_sd;
   out.current_bias_a = filter_.current_bias_a();
   out.current_bias_sd_a = filter_.current_bias_sd_a();
 }

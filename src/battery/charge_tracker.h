@@ -36,19 +36,12 @@ struct ChargeEstimate {
 // Why the voltage determines the charge poorly, as a sentence; empty where it does not.
 std::string limitation_of(const ChargeEstimate& estimate);
 
-struct ChargeTrackerSettings {
-  double update_s = 1;    // readings are averaged over this
-  double gap_s = 15;      // longer silences count as unknown current
-  double flat_sd = 0.15;  // of the charge from one voltage: from here on the curve counts as flat
-};
-
 // The charge filter over time: takes a robot's readings as they arrive, averages them, and bridges missing
 // ones (current by the model's power, voltage by counting, silence by a larger deviation). Depends only on
 // the readings' clock.
 class ChargeTracker {
  public:
-  ChargeTracker(const robot::Battery& battery, double idle_power_w,
-                const ChargeTrackerSettings& settings = {}, const ChargeTrust& trust = {});
+  ChargeTracker(const robot::Battery& battery, double idle_power_w);
 
   // Readings in order of time.
   void add(const ChargeReading& reading);
@@ -73,9 +66,7 @@ class ChargeTracker {
   void refresh();
 
   ChargeFilter filter_;
-  ChargeTrackerSettings settings_;
   double idle_power_w_;
-  double modelled_sd_;
   bool default_curve_;
   ChargeSource source_ = ChargeSource::unknown;
   ChargeEstimate estimate_;

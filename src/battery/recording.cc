@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <boost/algorithm/string/predicate.hpp>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -66,8 +67,6 @@ Result<std::vector<std::optional<std::size_t>>> positions(std::string_view heade
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view random_ending = "_rw.csv", test_ending = "_data.csv";
-
 // The CSV files of a folder, or those with a common beginning of their names; sorted.
 Result<std::vector<fs::path>> files_of(const std::string& folder_or_prefix) {
   std::error_code ignored;
@@ -90,30 +89,32 @@ Result<std::vector<fs::path>> files_of(const std::string& folder_or_prefix) {
   return found;
 }
 
-bool ends_with(const fs::path& file, std::string_view ending) {
-  return file.filename().string().ends_with(ending);
-}
-
-// A folder's files must be one battery's, which their names begin with.
-Result<std::vector<fs::path>> of_one_battery(const std::string& folder_or_prefix,
-                                             std::vector<fs::path> found) {
+// A file itself, or the files of one battery, which their names begin with, after `choose` has erased others.
+Result<std::vector<fs::path>> chosen_files(const std::string& file_or_prefix, const char* none,
+                                           void (*choose)(std::vector<fs::path>&)) {
   std::error_code ignored;
-  if (!fs::is_directory(folder_or_prefix, ignored)) return found;
+  const bool whole_folder = fs::is_directory(file_or_prefix, ignored);
+  if (!whole_folder && fs::exists(file_or_prefix, ignored)) return std::vector<fs::path>{file_or_prefix};
+  TRY_ASSIGN(auto found, files_of(file_or_prefix));
+  choose(found);
+  if (found.empty()) return fail(Fault::not_found, file_or_prefix, none);
   const auto battery = [](const fs::path& file) {
     const std::string name = file.filename().string();
     return name.substr(0, name.find('_'));
   };
-  if (battery(found.front()) == battery(found.back())) return found;
+  const std::string first = battery(found.front()), last = battery(found.back());
+  if (!whole_folder || first == last) return found;
   return invalid(
-      folder_or_prefix,
+      file_or_prefix,
       fmt::format("holds tests of several batteries, {} to {}: name one by the beginning of its files, as {}",
-                  battery(found.front()), battery(found.back()),
-                  (fs::path(folder_or_prefix) / battery(found.front())).string()));
+                  first, last, (fs::path(file_or_prefix) / first).string()));
 }
 
-bool stands_for_itself(const std::string& file) {
-  std::error_code ignored;
-  return fs::exists(file, ignored) && !fs::is_directory(file, ignored);
+bool is_test(const fs::path& file) {
+  return file.filename().string().ends_with("_data.csv");
+}
+bool is_random(const fs::path& file) {
+  return file.filename().string().ends_with("_rw.csv");
 }
 
 }  // namespace
@@ -198,25 +199,16 @@ Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path
 }
 
 Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix) {
-  if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};
-  TRY_ASSIGN(auto found, files_of(file_or_prefix));
-  std::erase_if(found, [](const fs::path& file) { return ends_with(file, random_ending); });
-  if (std::ranges::any_of(found, [](const fs::path& file) { return ends_with(file, test_ending); }))
-    std::erase_if(found, [](const fs::path& file) { return !ends_with(file, test_ending); });
-  if (found.empty())
-    return fail(Fault::not_found, file_or_prefix,
-                "stands for no tests: only for random discharges, *_rw.csv");
-  return of_one_battery(file_or_prefix, std::move(found));
+  return chosen_files(file_or_prefix, "stands for no tests: only for random discharges, *_rw.csv",
+                      [](std::vector<fs::path>& found) {
+                        std::erase_if(found, is_random);
+                        if (std::ranges::any_of(found, is_test)) std::erase_if(found, std::not_fn(is_test));
+                      });
 }
 
 Result<std::vector<std::filesystem::path>> discharge_files(const std::string& file_or_prefix) {
-  if (stands_for_itself(file_or_prefix)) return std::vector<fs::path>{file_or_prefix};
-  TRY_ASSIGN(auto found, files_of(file_or_prefix));
-  std::erase_if(found, [](const fs::path& file) { return !ends_with(file, random_ending); });
-  if (found.empty())
-    return fail(Fault::not_found, file_or_prefix,
-                "stands for no random discharges, *_rw.csv: name the files");
-  return of_one_battery(file_or_prefix, std::move(found));
+  return chosen_files(file_or_prefix, "stands for no random discharges, *_rw.csv: name the files",
+                      [](std::vector<fs::path>& found) { std::erase_if(found, std::not_fn(is_random)); });
 }
 
 }  // namespace joulecast::battery
