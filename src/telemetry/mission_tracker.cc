@@ -7,7 +7,7 @@ namespace joulecast::telemetry {
 
 SampleStep MissionTracker::on_sample(std::int64_t utime_us, double payload_kg) {
   SampleStep step;
-  if (current_) close_if_over(step.actions, utime_us);
+  if (current_) close_if_over(step.actions, utime_us - current_->last_utime_us, utime_us - begin_us_);
   if (!current_) {
     const bool just_after_end = explicit_end_us_ && utime_us > *explicit_end_us_ &&
                                 utime_us - *explicit_end_us_ <= limits_.after_end_us;
@@ -38,11 +38,7 @@ MissionActions MissionTracker::on_event(const signals::MissionEvent& event) {
 
 MissionActions MissionTracker::on_silence(std::int64_t silent_us) {
   MissionActions actions;
-  if (!current_) return actions;
-  const bool implicit = current_->implicit;
-  if (silent_us > (implicit ? limits_.implicit_idle_us : limits_.explicit_silence_us)) {
-    close(actions, current_->last_utime_us, implicit ? MissionEnd::idle : MissionEnd::unfinished);
-  }
+  if (current_) close_if_over(actions, silent_us, 0);
   return actions;
 }
 
@@ -75,10 +71,8 @@ void MissionTracker::recall(OpenMission mission, bool was_said) {
             mission.last_utime_us, mission.implicit});
 }
 
-void MissionTracker::close_if_over(MissionActions& actions, std::int64_t utime_us) {
+void MissionTracker::close_if_over(MissionActions& actions, std::int64_t silent_us, std::int64_t lasted_us) {
   const bool implicit = current_->implicit;
-  const std::int64_t silent_us = utime_us - current_->last_utime_us;
-  const std::int64_t lasted_us = utime_us - begin_us_;
   if (silent_us > (implicit ? limits_.implicit_idle_us : limits_.explicit_silence_us)) {
     close(actions, current_->last_utime_us, implicit ? MissionEnd::idle : MissionEnd::unfinished);
   } else if (lasted_us > (implicit ? limits_.implicit_max_us : limits_.explicit_max_us)) {
@@ -122,7 +116,7 @@ void MissionTracker::on_start(MissionActions& actions, const signals::MissionEve
     }
     close(actions, current_->last_utime_us, MissionEnd::superseded);
   }
-  open(actions, event.mission_id, event.utime_us, event.payload_kg, event.note);
+  open(actions, event.mission_id, event.utime_us, event.payload_kg, event.note, false);
 }
 
 void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent& event) {
@@ -159,22 +153,20 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
 }
 
 void MissionTracker::open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
-                          std::string note) {
+                          std::string note, bool implicit) {
   begin_us_ = utime_us;
-  current_ = OpenMission{id, utime_us, utime_us, payload_kg, false};
+  current_ = OpenMission{id, utime_us, utime_us, payload_kg, implicit};
   actions.push_back(
-      {MissionAction::Kind::open, std::move(id), utime_us, false, payload_kg, {}, std::move(note)});
+      {MissionAction::Kind::open, std::move(id), utime_us, implicit, payload_kg, {}, std::move(note)});
 }
 
 void MissionTracker::open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg) {
   ++counters_.opened_implicit;
-  begin_us_ = utime_us;
   std::string id = "implicit-" + std::to_string(utime_us);
   // A clock that starts again may do so at the same time.
   const auto same = std::ranges::count_if(past_, [&](const Past& past) { return past.start_us == utime_us; });
   if (same > 0) id += "-" + std::to_string(same + 1);
-  current_ = OpenMission{id, utime_us, utime_us, payload_kg, true};
-  actions.push_back({MissionAction::Kind::open, std::move(id), utime_us, true, payload_kg, {}, {}});
+  open(actions, std::move(id), utime_us, payload_kg, {}, true);
 }
 
 void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note,

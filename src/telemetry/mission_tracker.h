@@ -121,12 +121,13 @@ class MissionTracker {
   };
 
   void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
-            std::string note);
+            std::string note, bool implicit);
   void open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg);
   // `said_us`: the time of the end according to the robot.
   void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note = {},
              std::optional<std::int64_t> said_us = {});
-  void close_if_over(MissionActions& actions, std::int64_t utime_us);
+  // `silent_us` since its newest sample or event, `lasted_us` since its start.
+  void close_if_over(MissionActions& actions, std::int64_t silent_us, std::int64_t lasted_us);
   void on_start(MissionActions& actions, const signals::MissionEvent& event);
   void on_end(MissionActions& actions, const signals::MissionEvent& event);
   void remember(Past past);
