@@ -311,20 +311,23 @@ bool SpeedSolver::assemble(const std::vector<double>& z) {
            d1 = l.fvv * v1 * v1 + 2 * mixed * v1 + l.fqq * p * p,
            d01 = l.fvv * v0 * v1 + mixed * (v0 - v1) - l.fqq * p * p;
     BoundState* state = bound_states_.data() + first_bound_[k];
-    double least = 1;
+    double least = 1, products = 0, push0 = 0, push1 = 0, along0 = 0, along1 = 0;
     each_bound(k, first, last,
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
                  const double slack = -g, y = state->multiplier, inverse = 1 / slack, weight = y * inverse;
                  *state++ = {y, slack, g0, g1, 0, j};
                  least = std::min(least, slack);
                  logarithms.add(slack);
-                 products_ += y * slack;
+                 products += y * slack;
                  d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
                      d01 += weight * g0 * g1 + y * g01;
-                 push_[k] += inverse * g0, push_[k + 1] += inverse * g1;
-                 stationarity_[k] += y * g0, stationarity_[k + 1] += y * g1;
+                 push0 += inverse * g0, push1 += inverse * g1;
+                 along0 += y * g0, along1 += y * g1;
                });
     if (!(least > 0)) return false;
+    products_ += products;
+    push_[k] += push0, push_[k + 1] += push1;
+    stationarity_[k] += along0, stationarity_[k + 1] += along1;
     diagonal_[k] += d0 + l.fv * v00, diagonal_[k + 1] += d1 + l.fv * v11;
     off_[k] += d01;
     magnitude_[k] += std::fabs(d0) + std::fabs(l.fv * v00),
