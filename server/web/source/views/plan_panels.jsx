@@ -129,10 +129,10 @@ function frontData(answer, joule) {
 }
 
 export function Front({ answer, take }) {
-  const front = answer.pareto;
+  const front = answer.pareto.toReversed();
   const scale = energyScale(front.map((p) => p.energy_j));
   const data = useMemo(() => frontData(answer, scale.joule), [answer, scale.joule]);
-  const [at, setAt] = useState(0);
+  const [at, setAt] = useState(front.length - 1);
   const point = front[Math.min(at, front.length - 1)];
   if (front.length < 2)
     return <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>;
