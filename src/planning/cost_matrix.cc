@@ -20,7 +20,7 @@ void drive(const Leg& leg, Driver& driver) {
   for (const double d : leg.distances_m) driver.straight(d);
   for (const double a : leg.turns_rad) driver.turn(a);
   for (const auto& run : leg.others) driver.other(run);
-  if (leg.dwell_s > 0) driver.stand(leg.dwell_s);
+  for (const double s : leg.dwells_s) driver.stand(s);
 }
 
 // Turn towards the place, drive there, turn to its heading.
@@ -107,6 +107,7 @@ std::string_view name_of(Obstacle obstacle) {
 Leg leg_of(const Path& path) {
   Leg leg;
   for (const Run& run : path.runs) {
+    leg.dwells_s.push_back(run.dwell_before_s);
     if (run.turn != 0 && run.length() <= widest_turn_rad)
       leg.turns_rad.push_back(run.length());
     else if (run.turn == 0 && run.straight() && run.length() <= longest_leg_m)
@@ -114,7 +115,7 @@ Leg leg_of(const Path& path) {
     else
       leg.others.push_back(std::make_shared<const Run>(run));
   }
-  leg.dwell_s = path.dwell_s();
+  leg.dwells_s.push_back(path.dwell_after_s);
   return leg;
 }
 
@@ -128,9 +129,10 @@ void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional
   stretches.clear();
   Recorder empty{stretches, false}, loaded{stretches, true};
   drive_empty(task, robot, pose, empty);
+  empty.stand(task.stations.pickup_dwell_s.value_or(0));
   turn_at_pickup(task, pose, loaded);
   drive_loaded(task, loaded);
-  if (const double dwell_s = task.stations.dwell_s(); dwell_s > 0) loaded.stand(dwell_s);
+  loaded.stand(task.stations.dropoff_dwell_s.value_or(0));
 }
 
 CostMatrix::CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> tasks)

@@ -20,7 +20,7 @@ struct Leg {
   std::vector<double> distances_m;
   std::vector<double> turns_rad;
   std::vector<std::shared_ptr<const Run>> others = {};
-  double dwell_s = 0;
+  std::vector<double> dwells_s = {};
 };
 Leg leg_of(const Path& path);
 
@@ -61,8 +61,8 @@ struct Stretch {
   std::shared_ptr<const Run> run = nullptr;  // of `other`
 };
 
-// The segments that the robot of that row drives for a task, in order, and then its dwells. `pose` is
-// required if the task has no empty leg.
+// The segments that the robot of that row drives for a task, in order, with its dwells. `pose` is required
+// if the task has no empty leg.
 void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
                   std::vector<Stretch>& stretches);
 

@@ -55,7 +55,7 @@ class OnePrice : public ::testing::TestWithParam<int> {
         path.push_back({{"kind", "arc"}, {"radius_m", between(1, 5)}, {"angle_rad", between(0.5, 3)}});
       else
         path.push_back({{"kind", "straight"}, {"length_m", between(0.5, 20)}});
-      path.push_back({{"kind", "dwell"}, {"duration_s", 0}});
+      path.push_back({{"kind", "dwell"}, {"duration_s", GetParam() % 2 ? between(0, 9) : 0}});
     }
     return path;
   }
@@ -88,7 +88,8 @@ class OnePrice : public ::testing::TestWithParam<int> {
     request["payload_kg"] = task.payload_kg;
     if (task.way.contains("path") && task.dwell_s > 0)
       request["path"].push_back({{"kind", "dwell"}, {"duration_s", task.dwell_s}});
-    if (task.way.contains("pickup") && task.dwell_s > 0) request["dropoff_dwell_s"] = task.dwell_s;
+    if (task.way.contains("pickup") && task.dwell_s > 0)
+      request["pickup_dwell_s"] = 8, request["dropoff_dwell_s"] = task.dwell_s;
     request.update(more);
     return request;
   }
