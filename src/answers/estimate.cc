@@ -28,6 +28,7 @@ planning::Profile series_of(const dynamics::DriveModel& drive, const GivenMotion
   for (std::size_t k = 0; k + 1 < points.size(); ++k) {
     const energy::MotionPoint &a = points[k], &b = points[k + 1];
     const double span = b.time_s - a.time_s;
+    if (span == 0) continue;
     const double slope = (b.speed_m_s - a.speed_m_s) / span,
                  bend = (b.yaw_rate_rad_s - a.yaw_rate_rad_s) / span;
     const std::array<double, 2> climb = *energy::climb_of_span(a, b);  // estimate_motion() accepted it
@@ -150,13 +151,14 @@ const Input<MotionColumns>& columns_input() {
   using Columns = MotionColumns;
   static const auto input =
       Input<Columns>({}, "speeds are linear in between")
-          .numbers("time_s", &Columns::time_s, points, {.minimum = 0, .maximum = 1e7}, "times, ascending")
+          .numbers("time_s", &Columns::time_s, points, {.minimum = 0, .maximum = 1e7},
+                   "times, ascending; repeated where only the acceleration or the climb steps")
           .numbers("speed_m_s", &Columns::speed_m_s, points, speed, "forward speed; negative: backwards")
           .numbers("yaw_rate_rad_s", &Columns::yaw_rate_rad_s, points, speed,
                    "rate of turning, positive to the left")
           .check([](Fields& fields, Columns& columns, described::Nothing&) {
             check_length(fields, "speed_m_s", columns.time_s.size(), columns.speed_m_s.size());
-            check_length(fields, "speed_m_s", columns.time_s.size(), columns.yaw_rate_rad_s);
+            check_length(fields, "yaw_rate_rad_s", columns.time_s.size(), columns.yaw_rate_rad_s);
           })
           .numbers("climb_rad", &Columns::climb_rad, points, {.minimum = -0.785, .maximum = 0.785},
                    "angle of the floor along the heading, nose up positive, linear in between; used if the "

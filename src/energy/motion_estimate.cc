@@ -114,12 +114,15 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
     y[pose_index + 2] = start->heading_rad;
   }
   for (std::size_t k = 1; k < points.size(); ++k) {
-    if (!(points[k].time_s - points[k - 1].time_s >= least_span_s))
+    const double duration = points[k].time_s - points[k - 1].time_s;
+    const bool repeated = duration == 0 && points[k].speed_m_s == points[k - 1].speed_m_s &&
+                          points[k].yaw_rate_rad_s == points[k - 1].yaw_rate_rad_s;
+    if (!(duration >= least_span_s) && !repeated)
       return invalid("time_s/" + std::to_string(k), "must be later than the one before, by 1e-9 s at least");
     const auto climb = climb_of_span(points[k - 1], points[k]);
     if (!climb) return invalid("height_m/" + std::to_string(k), climb.error().message);
+    if (repeated) continue;
     span.begin(points[k - 1], points[k], *climb);
-    const double duration = points[k].time_s - points[k - 1].time_s;
     const double fastest = std::max(std::fabs(points[k].speed_m_s), std::fabs(points[k - 1].speed_m_s));
     cvode.limit_step(start && fastest > 0 ? finest_floor_m / fastest : 0);
     TRY(cvode.advance(0, duration));

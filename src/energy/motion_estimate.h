@@ -33,9 +33,10 @@ struct StartPose {
 
 // Energy accounts of a motion through the drive model, by CVODE over each span (relative tolerance 1e-8): the
 // energy that the meter would report for a robot that drove it. Nothing is measured: battery_j equals
-// modelled_j and nothing is unexplained. Times must increase by 1e-9 s at least and there must be at least
-// two points; a jump in speed is rejected, since it costs infinite power. Errors name "time_s",
-// "time_s/<index>" or "height_m/<index>".
+// modelled_j and nothing is unexplained. Times must increase by 1e-9 s at least, except where a point repeats
+// the speeds of the one before, as at a step of acceleration. There must be at least two points; a jump in
+// speed is rejected, since it costs infinite power. Errors name "time_s", "time_s/<index>" or
+// "height_m/<index>".
 Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           std::span<const MotionPoint> points, double payload_kg,
                                           const std::optional<StartPose>& start = std::nullopt);

@@ -153,6 +153,7 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
       {{{"kind", "turn"}, {"angle_rad", 1.3}}},
       {{{"kind", "arc"}, {"radius_m", 1.2}, {"angle_rad", 2}}},
       {straight(2), {{"kind", "arc"}, {"radius_m", 0.8}, {"angle_rad", -1.5}}, straight(1)},
+      {straight(2), {{"kind", "turn"}, {"angle_rad", 1.3}}, straight(1)},
       {{{"kind", "clothoid"}, {"length_m", 4}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 0.7}}}};
   // The last current is just above the friction's, and bounds the braking too.
   for (const double current_a : {8.0, 0.8, 0.4, 0.235}) {
@@ -184,6 +185,11 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
       }
     }
   }
+}
+
+TEST(Estimate, NamesColumnsOfOtherLengths) {
+  json motion = {{"time_s", {0, 1}}, {"speed_m_s", {0, 1}}, {"yaw_rate_rad_s", {0, 0, 0}}};
+  EXPECT_EQ(fault(estimated, {{"profile", motion}}).field, "/profile/yaw_rate_rad_s");
 }
 
 TEST(Estimate, PricesTheProfilesFloor) {
