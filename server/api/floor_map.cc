@@ -118,8 +118,8 @@ const Table<FloorAnswer>& floor_map_table() {
           .value("covered_s", AT(map.covered_s), "s, in all squares", at_least_0)
           .value("distance_m", AT(map.distance_m), "m, in all squares", at_least_0)
           .value("energy_j", AT(map.energy_j), "J, in all squares")
-          .value("measured_j", AT(map.measured_j), "J, in all squares")
-          .value("modelled_j", AT(map.modelled_j), "J, in all squares")
+          .value("measured_j", AT(map.measured_j), "J, sum of measured_j of all squares")
+          .value("modelled_j", AT(map.modelled_j), "J, sum of modelled_j of all squares")
           .number_or_null(
               "ratio", [](const A& a) { return ratio(a.map.measured_j, a.map.modelled_j); },
               "measured_j / modelled_j")
