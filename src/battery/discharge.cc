@@ -62,7 +62,8 @@ class Problem final : public energy::InitialValueProblem {
 
   // Relative 1e-7 with floors far below the accuracy of these quantities.
   void weights(std::span<const double> y, std::span<double> weight) const override {
-    static constexpr double floors[size] = {1e-8, 1e-6, 1e-6, 1e-8, 1e-8, 1e-4, 1e-7, 1e-3};
+    static constexpr std::array floors{1e-8, 1e-6, 1e-6, 1e-8, 1e-8, 1e-4, 1e-7, 1e-3};
+    static_assert(floors.size() == size);
     for (std::size_t i = 0; i < size; ++i) weight[i] = 1 / (1e-7 * std::abs(y[i]) + floors[i]);
   }
 

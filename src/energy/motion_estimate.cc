@@ -105,6 +105,7 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           std::span<const MotionPoint> points, double payload_kg,
                                           const std::optional<StartPose>& start) {
   if (points.size() < 2) return invalid("time_s", "must have at least 2 points");
+  if (points.front().time_s == points.back().time_s) return invalid("time_s", "must last longer than 0 s");
   MotionSpan span(model, payload_kg, start.has_value());
   Cvode cvode(motion_state_size, span);
   const std::span<double> y = cvode.state();
@@ -118,7 +119,8 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
     const bool repeated = duration == 0 && points[k].speed_m_s == points[k - 1].speed_m_s &&
                           points[k].yaw_rate_rad_s == points[k - 1].yaw_rate_rad_s;
     if (!(duration >= least_span_s) && !repeated)
-      return invalid("time_s/" + std::to_string(k), "must be later than the one before, by 1e-9 s at least");
+      return invalid("time_s/" + std::to_string(k),
+                     "must be later than the one before, by 1e-9 s at least, or repeat its point");
     const auto climb = climb_of_span(points[k - 1], points[k]);
     if (!climb) return invalid("height_m/" + std::to_string(k), climb.error().message);
     if (repeated) continue;

@@ -117,5 +117,19 @@ TEST(MotionEstimate, RejectsNonIncreasingTimes) {
   }
 }
 
+// The columns of a profile repeat the point at the end of a stop; a motion of one instant is none.
+TEST(MotionEstimate, RepeatedPointsAddNothing) {
+  const dynamics::DriveModel model(testing::nomad(), {});
+  const MotionPoint a{0, 0.5, 0}, b{2, 0.5, 0};
+  const auto once = estimate_motion(model, std::vector{a, b}, 0);
+  const auto twice = estimate_motion(model, std::vector{a, a, b, b}, 0);
+  ASSERT_TRUE(once && twice);
+  EXPECT_EQ(twice->modelled_j, once->modelled_j);
+  EXPECT_EQ(twice->duration_s, 2);
+  const auto instant = estimate_motion(model, std::vector{a, a}, 0);
+  ASSERT_FALSE(instant);
+  EXPECT_EQ(instant.error().field, "time_s");
+}
+
 }  // namespace
 }  // namespace joulecast::energy

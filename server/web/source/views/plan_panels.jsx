@@ -132,8 +132,9 @@ export function Front({ answer, take }) {
   const front = answer.pareto.toReversed();
   const scale = energyScale(front.map((p) => p.energy_j));
   const data = useMemo(() => frontData(answer, scale.joule), [answer, scale.joule]);
-  const [at, setAt] = useState(front.length - 1);
-  const point = front[Math.min(at, front.length - 1)];
+  const [picked, setAt] = useState(Infinity);
+  const at = Math.min(picked, front.length - 1);
+  const point = front[at];
   if (front.length < 2)
     return <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>;
   const [first, last] = [front[0], front[front.length - 1]];
