@@ -77,6 +77,8 @@ TEST(VirtualRobot, DerivesPowerFromMotorCurrents) {
   }
   const Diagnosis d = diagnose_robot(robot);
   EXPECT_EQ(d.power, PowerSource::motors);
+  ASSERT_FALSE(d.where.empty());
+  EXPECT_EQ(d.where[0].channel, "motor_power");
   ASSERT_EQ(d.effects.size(), 1u);
   EXPECT_EQ(d.effects[0].id, "coulomb_friction");
   ASSERT_TRUE(d.shrinkage);

@@ -181,12 +181,14 @@ class Diagnoser {
     }
   }
 
+  const char* power_channel() const {
+    return d_.power == PowerSource::battery ? "battery_power" : "motor_power";
+  }
+
   // Lowers the noise floor to the held-out error of a model that predicts held-out parts.
   void lower_noise_floor() {
     d_.channels = channel_gaps(*fit_);
-    const auto gap =
-        std::ranges::find(d_.channels, d_.power == PowerSource::battery ? "battery_power" : "motor_power",
-                          &ChannelGap::channel);
+    const auto gap = std::ranges::find(d_.channels, power_channel(), &ChannelGap::channel);
     if (d_.power == PowerSource::none || gap == d_.channels.end()) {
       d_.noise_floor = missing;
       return;
@@ -236,6 +238,7 @@ class Diagnoser {
                after = d_.verdict == Verdict::none ? before : all(answer_.explained_w);
     if (d_.verdict != Verdict::none)
       d_.where = localise(windows, robot_, rows.power_w, before, d_.noise_floor);
+    for (WhereRegion& region : d_.where) region.channel = power_channel();
     d_.figures = figures_of(windows, rows.power_w, before, after, recordings_, robot_);
   }
 
