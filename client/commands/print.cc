@@ -168,6 +168,7 @@ void print_fleet(const Json& robots) {
     return Column{title, "", 0, 1,
                   [quantile](const Json& r) { return span(number_at(r["run_time_quantiles_s"], quantile)); }};
   };
+  if (robots.empty()) fmt::print("no robot has a model\n");
   if (rows.empty()) return;
   print_rows(rows, {{"robot", "robot_id"},
                     {"charge %", "state_of_charge", 1, 100},

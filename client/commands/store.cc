@@ -71,6 +71,7 @@ Result<T> of_option(Result<T> result, const char* option) {
 }
 
 Result<Exit> copy(StoreOptions& options) {
+  if (options.to == options.from) return invalid("--to", "is the store of --from");
   TRY_ASSIGN(const auto from, of_option(history::open_tables(options.from, true), "--from"));
   TRY_ASSIGN(const auto to, of_option(history::open_tables(options.to, false), "--to"));
   TableLines lines("copying");

@@ -202,6 +202,12 @@ TEST_F(WrongUse, NamesOptionOfInvalidTime) {
               HasSubstr("--from: 'yesterday' is neither"));
 }
 
+TEST_F(WrongUse, RejectsCopiesOntoThemselves) {
+  ::testing::internal::CaptureStderr();
+  told({"store", "copy", "--from", "a.db", "--to", "a.db"});
+  EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("--to: is the store of --from"));
+}
+
 TEST_F(WrongUse, RequiresOneAlternative) {
   const std::vector<std::string> adopt{"adopt", "amr", "--server", "http://127.0.0.1:1"};
   EXPECT_THAT(told(adopt),

@@ -35,5 +35,11 @@ TEST(PrintAutonomy, ExplainsUnreachablePace) {
   EXPECT_THAT(printed(), ::testing::HasSubstr("\nWith 0 kg the robot cannot drive.\n"));
 }
 
+TEST(PrintAutonomy, ReportsFleetsWithoutModels) {
+  ::testing::internal::CaptureStdout();
+  print_autonomy({{"robots", json::array()}}, "Wh");
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "no robot has a model\n");
+}
+
 }  // namespace
 }  // namespace joulecast::client
