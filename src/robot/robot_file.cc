@@ -88,7 +88,7 @@ bool object_of(const Json& value, const std::string& pointer, const std::set<std
                Problems& problems) {
   if (!is_kind(value.is_object(), "an object", value, pointer, problems)) return false;
   for (const auto& [key, unused] : value.items())
-    if (!known.contains(key)) problems.add(child(pointer, key), "is an unknown key");
+    if (!known.contains(key)) problems.add(child(pointer, key), "is an unknown member");
   return true;
 }
 

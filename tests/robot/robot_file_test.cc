@@ -171,7 +171,7 @@ TEST(RobotFile, ReportsAllProblems) {
   EXPECT_THAT(all, HasSubstr("/mass/chassis_kg: is -2 kg, must be greater than 0 kg and at most 100000 kg"));
   EXPECT_THAT(all, HasSubstr("/motor/friction_torque_nm/1: is -0.5 N m, must be at least 0 N m"));
   EXPECT_THAT(all, HasSubstr("/limits/speed_m_s: is missing"));
-  EXPECT_THAT(all, HasSubstr("/battery/colour: is an unknown key"));
+  EXPECT_THAT(all, HasSubstr("/battery/colour: is an unknown member"));
 }
 
 TEST(RobotFile, RejectsUnknownKeys) {
@@ -180,7 +180,7 @@ TEST(RobotFile, RejectsUnknownKeys) {
         "/battery/open_circuit_voltage/x", "/battery/branches/0/x", "/battery/charge_lags/1/x"}) {
     json document = robot_to_json(full_model());
     document[json::json_pointer(pointer)] = 1;
-    EXPECT_EQ(error_of(document), (Error{Fault::invalid, pointer, "is an unknown key"}));
+    EXPECT_EQ(error_of(document), (Error{Fault::invalid, pointer, "is an unknown member"}));
   }
 }
 
@@ -276,7 +276,7 @@ TEST(BatteryFile, MatchesBatteryObject) {
   const auto broken = parse_battery(document.dump());
   ASSERT_FALSE(broken);
   EXPECT_THAT(describe(broken.error()), HasSubstr("/battery/capacity_ah: is missing"));
-  EXPECT_THAT(describe(broken.error()), HasSubstr("/battery/robot_id: is an unknown key"));
+  EXPECT_THAT(describe(broken.error()), HasSubstr("/battery/robot_id: is an unknown member"));
 }
 
 TEST(RobotFields, UnitsFollowFromNames) {

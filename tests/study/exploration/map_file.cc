@@ -24,7 +24,7 @@ Result<void> object_with(const Json& value, const std::string& pointer,
   if (!value.is_object()) return invalid(pointer, fmt::format("is {}, must be an object", value.type_name()));
   for (const auto& [key, unused] : value.items())
     if (std::find(known.begin(), known.end(), key) == known.end())
-      return invalid(pointer + "/" + key, "is an unknown key");
+      return invalid(pointer + "/" + key, "is an unknown member");
   return {};
 }
 
