@@ -79,7 +79,7 @@ struct Exchange {
   double duration_s = 0;  // from the last byte of the request to the last byte of the answer's head and body
   std::uint64_t request_bytes = 0;
   std::uint64_t response_bytes = 0;
-  bool stream = false;  // the duration is that of a stream, not of an answer
+  bool stream = false;  // of events: the duration is the client's choice
 };
 
 // Receives the server's events; called on the I/O thread, must not block.

@@ -178,7 +178,7 @@ class StreamSession final : public Session {
     const std::array<net::const_buffer, 2> whole{net::buffer(head_), net::buffer(body.data(), body.size())};
     bool sent = co_await write(whole);
     if (sent && streamed) sent = co_await send_stream(chunked);
-    observe(streamed);
+    observe(streamed && response_.stream->endless());
     co_return sent;
   }
 

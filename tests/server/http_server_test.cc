@@ -28,12 +28,13 @@ class Recorder : public ServerObserver {
   void exchanged(const Exchange& exchange) override {
     ++exchanges;
     last_status = exchange.status;
+    streams += exchange.stream;
   }
   void refused(Refusal refusal) override { ++refusals[static_cast<std::size_t>(refusal)]; }
   void connections(std::size_t count) override { open = count; }
   int count(Refusal refusal) const { return refusals[static_cast<std::size_t>(refusal)]; }
 
-  std::atomic<int> exchanges{0};
+  std::atomic<int> exchanges{0}, streams{0};
   std::atomic<unsigned> last_status{0};
   std::atomic<std::size_t> open{0};
   std::array<std::atomic<int>, static_cast<std::size_t>(Refusal::count_)> refusals{};
@@ -477,6 +478,15 @@ TEST_F(HttpServerTest, StreamingKeepsConnection) {
   EXPECT_TRUE(old.closed_within(2s));
 }
 
+TEST_F(HttpServerTest, MeasuresAnswersInPieces) {
+  start();
+  RawClient client(port());
+  client.send(get_text("/count"));
+  EXPECT_TRUE(client.reply().complete);
+  EXPECT_TRUE(soon([&] { return recorder_.exchanges == 1; }));
+  EXPECT_EQ(recorder_.streams, 0);
+}
+
 TEST_F(HttpServerTest, SlowReaderPausesItsGenerator) {
   start();
   RawClient client(port(), 4096);
@@ -507,6 +517,7 @@ TEST_F(HttpServerTest, SendsEventsAndHeartbeats) {
   EXPECT_NE(event.find("\ndata: {\"a\":1}\n\n"), std::string::npos);
   EXPECT_NE(client.read_until(": still here\n\n").find("still here"), std::string::npos);
   client.close();
+  EXPECT_TRUE(soon([&] { return recorder_.streams == 1; }));
   EXPECT_TRUE(soon([&] { return hub_.counts().subscribers == 0; }));
 }
 
