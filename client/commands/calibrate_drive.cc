@@ -302,16 +302,17 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
                                                energy_column("fitted", "calibrated_j", unit),
                                                error("calibrated_error")});
   std::size_t unused = 0;
-  double total = 0, missed = 0;
+  double total = 0, missed = 0, missed_before = 0;
   for (const CalibratedMission& c : outcome.missions) {
     if (c.trained_on) continue;
     ++unused;
     total += c.measured_j;
     missed += std::fabs(c.after_j - c.measured_j);
+    missed_before += std::fabs(c.before_j - c.measured_j);
   }
   if (unused > 0)
-    fmt::print("error on the {}: {:.1f} % of their energy\n", count_of(unused, "held-out mission"),
-               1e2 * missed / total);
+    fmt::print("error on the {}: {:.1f} % of their energy; robot file {:.1f} %\n",
+               count_of(unused, "held-out mission"), 1e2 * missed / total, 1e2 * missed_before / total);
 }
 
 Result<Exit> run_drive(CalibrateDriveOptions& options) {

@@ -161,7 +161,9 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
     for (telemetry::Import& import : *missions) {
       all.push_back({std::move(import), source.shown});
       if (all.back().begin_utime_us() < telemetry::year_2000_utime_us)
-        return invalid("--start", source.shown + " begins before 2000: give the time of its first row");
+        return invalid("--start", source.shown +
+                                      " begins before 2000: give the time of its first row, or correct the "
+                                      "unit of its times");
     }
     if (how.start_utime_us) how.start_utime_us = all.back().end_utime_us() + how.pause_us;
   }

@@ -210,8 +210,10 @@ void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_ut
       sample.utime_us <= taken_in_->utime_us)
     return;
   contradictions_->hear();
-  if (const auto fault = telemetry::check_plausible(sample))
+  if (const auto fault = telemetry::check_plausible(sample)) {
+    ++implausible_;
     return on_fault(IngestFault::implausible, 1, telemetry::describe(*fault));
+  }
   if (is_too_far_ahead(sample.utime_us, host_utime_us)) return;
   if (sample.utime_us - host_utime_us > clock_ahead_us) on_fault(IngestFault::clock_ahead);
   snapshot_.clock_ahead_us = sample.utime_us - host_utime_us;
@@ -320,7 +322,10 @@ bool RobotSession::is_too_fast(std::int64_t elapsed_us) {
 void RobotSession::place(const signals::Sample& sample) {
   const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
   // What the daemon left out is counted as such.
-  const std::int64_t thinned = std::min(place.missing, one_of_ - 1), missing = place.missing - thinned;
+  const std::int64_t refused = std::min(place.missing, implausible_),
+                     thinned = std::min(place.missing - refused, one_of_ - 1),
+                     missing = place.missing - refused - thinned;
+  implausible_ -= refused;
   if (thinned > 0)
     note_fault(IngestFault::queue_full, static_cast<std::uint64_t>(thinned), {}, snapshot_.received_utime_us);
   if (missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(missing));

@@ -186,7 +186,8 @@ class RobotSession {
   std::shared_ptr<const ModelInForce>
       next_;  // in force, and the meter's when the open mission has ended; else null
   SampleOrder order_;
-  std::int64_t one_of_ = 1;  // of the last sample
+  std::int64_t one_of_ = 1;       // of the last sample
+  std::int64_t implausible_ = 0;  // samples that no later sample has been found to miss
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;

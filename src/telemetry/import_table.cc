@@ -203,7 +203,8 @@ Result<bool> ImportTable::next() {
                 ? R"(. If its columns changed during the recording, split the table here and name those of )"
                   R"(the second part in "header")"
             : layout_.format.header.empty()
-                ? R"(. Name every column in "header", with "skip_lines": 1 to skip the present header)"
+                ? R"(. Name every column in "header", with "skip_lines": 1 to skip the present header; numbers )"
+                  R"(with decimal commas need quotes or another separator)"
                 : "";
       return tl::unexpected(std::move(error));
     }

@@ -146,10 +146,9 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
   set->beyond_range = std::move(log.beyond_range);
   set->unreadable = log.unreadable;
   if (log.unreadable > 0)
-    set->notes.push_back(fmt::format(
-        "{} messages or values could not be read, exceed a limit or are duplicates", log.unreadable));
-  if (!beyond_ranges.empty())
-    set->notes.push_back("of these " + beyond_ranges + "; the others may be biased");
+    set->notes.push_back(
+        fmt::format("{} messages or values could not be read, exceed a limit or are duplicates{}{}",
+                    log.unreadable, beyond_ranges.empty() ? "" : "; ", beyond_ranges));
   if (log.samples_outside > 0)
     set->notes.push_back(fmt::format(
         "{} samples before a mission's start or just after its end were left out", log.samples_outside));

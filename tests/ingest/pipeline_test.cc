@@ -252,6 +252,7 @@ TEST_F(PipelineTest, RejectsInfiniteAndAbsurdValues) {
   send_range(53, 100);
   send(event(MissionPhase::finished, 101));
   EXPECT_EQ(harness.faults(IngestFault::implausible), 3u);
+  EXPECT_EQ(harness.faults(IngestFault::missing), 0u);
   EXPECT_NEAR(harness.missions().at(0).accounts.measured_j, 48 * 99 * 0.02, 1e-6);
 }
 

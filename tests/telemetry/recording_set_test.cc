@@ -113,7 +113,7 @@ TEST(RecordingSet, CountsUnreadableMessages) {
   EXPECT_EQ(set->missions[0].samples.size(), good.samples.size());
   EXPECT_EQ(set->unreadable, 4u);
   EXPECT_THAT(set->notes,
-              ElementsAre(HasSubstr("4 messages or values"), HasSubstr("an impossible wheel_velocity"),
+              ElementsAre(AllOf(HasSubstr("4 messages or values"), HasSubstr("an impossible wheel_velocity")),
                           HasSubstr("1 samples before")));
 }
 
