@@ -177,6 +177,12 @@ class Variables {
   std::span<const Window> at_;
 };
 
+// Each row of z times its `by`, without any multiple of `by`: a constant is an effect.
+Eigen::MatrixXd varying(const Eigen::MatrixXd& z, const Eigen::VectorXd& by) {
+  const Eigen::MatrixXd product = by.asDiagonal() * z;
+  return product - by * (by.transpose() * product / std::max(by.squaredNorm(), 1e-300));
+}
+
 Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
   Eigen::MatrixXd out(ix(rows.size()), z.cols());
   for (std::size_t r = 0; r < rows.size(); ++r)
@@ -191,9 +197,8 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   std::array<Eigen::VectorXd, 2> way, amps, turns;
   double per_amp = 0, size = 0;
   for (const std::size_t s : {0u, 1u}) {
-    way[s] = v.column([s](const Window& w) {
-      return w.resting[s] || w.speed_rad_s[s] == 0 ? 0.0 : std::copysign(1.0, w.speed_rad_s[s]);
-    });
+    way[s] =
+        v.column([s](const Window& w) { return w.moving[s] ? std::copysign(1.0, w.speed_rad_s[s]) : 0.0; });
     amps[s] = v.column([s](const Window& w) { return w.current_a[s]; });
     turns[s] = v.column([s](const Window& w) { return w.speed_rad_s[s]; });
     per_amp += (m.voltage_constant_v_s_rad * m.gear_ratio * turns[s] + 2 * m.resistance_ohm * amps[s])
@@ -203,16 +208,15 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   }
   const double torque_unit = d.mean_power_w / std::max(per_amp, 1e-9);
   const double voltage_unit = d.mean_power_w / std::max(size, 1e-9);
-  const auto each = [](const Eigen::MatrixXd& z, const std::array<Eigen::VectorXd, 2>& by) {
-    return std::array<Eigen::MatrixXd, 2>{by[0].asDiagonal() * z, by[1].asDiagonal() * z};
+  const Eigen::VectorXd metered =
+      v.column([](const Window& w) { return std::isfinite(w.battery_power_w) ? 1.0 : 0.0; });
+  const auto add = [&](const std::string& name, const Eigen::MatrixXd& z, bool repeats) {
+    out.push_back({Channel::bus, name, {varying(z, metered), {}}, d.mean_power_w, repeats});
+    out.push_back(
+        {Channel::torque_right, name, {varying(z, way[0]), varying(z, way[1])}, torque_unit, repeats});
   };
-  const Eigen::MatrixXd intervals = v.intervals();
-  out.push_back({Channel::bus, "time", {intervals, {}}, d.mean_power_w, false});
-  out.push_back({Channel::torque_right, "time", each(intervals, way), torque_unit, false});
-  for (const auto& [name, z] : bases) {
-    out.push_back({Channel::bus, name, {z, {}}, d.mean_power_w});
-    out.push_back({Channel::torque_right, name, each(z, way), torque_unit});
-  }
+  add("time", v.intervals(), false);
+  for (const auto& [name, z] : bases) add(name, z, true);
   const double most_a = std::max({amps[0].cwiseAbs().maxCoeff(), amps[1].cwiseAbs().maxCoeff(), 1e-9});
   const double most_rad_s = std::max({turns[0].cwiseAbs().maxCoeff(), turns[1].cwiseAbs().maxCoeff(), 1e-9});
   const auto bends = [](const std::array<Eigen::VectorXd, 2>& of, double most) {
@@ -226,7 +230,11 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   };
   out.push_back({Channel::voltage_right, "speed", bends(turns, most_rad_s), voltage_unit});
   out.push_back({Channel::voltage_right, "current", bends(amps, most_a), voltage_unit});
-  out.push_back({Channel::voltage_right, "time", each(v.times() / most_a, amps), voltage_unit});
+  const Eigen::MatrixXd decays = v.times() / most_a;
+  out.push_back({Channel::voltage_right,
+                 "time",
+                 {amps[0].asDiagonal() * decays, amps[1].asDiagonal() * decays},
+                 voltage_unit});
 }
 
 void add_kinematic_functions(const Data& d, const Variables& v, std::vector<Function>& out) {
@@ -276,7 +284,10 @@ std::vector<Function> make_functions(const Data& d) {
   const Variables of_windows(d, d.windows);
   if (d.at_readings()) {
     for (const auto& [name, z] : Variables(d, d.rows.instants).bases())
-      out.push_back({Channel::power, name, {row_means(d.rows, z), {}}, d.mean_power_w});
+      out.push_back({Channel::power,
+                     name,
+                     {varying(row_means(d.rows, z), Eigen::VectorXd::Ones(ix(d.rows.size()))), {}},
+                     d.mean_power_w});
   } else if (d.motors) {
     add_motor_functions(d, of_windows.bases(), of_windows, out);
   }
