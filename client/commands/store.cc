@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -71,7 +72,10 @@ Result<T> of_option(Result<T> result, const char* option) {
 }
 
 Result<Exit> copy(StoreOptions& options) {
-  if (options.to == options.from) return invalid("--to", "is the store of --from");
+  std::error_code none;
+  if (options.to == options.from ||
+      std::filesystem::equivalent(history::sqlite_path(options.to), history::sqlite_path(options.from), none))
+    return invalid("--to", "is the store of --from");
   TRY_ASSIGN(const auto from, of_option(history::open_tables(options.from, true), "--from"));
   TRY_ASSIGN(const auto to, of_option(history::open_tables(options.to, false), "--to"));
   TableLines lines("copying");

@@ -105,7 +105,6 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           std::span<const MotionPoint> points, double payload_kg,
                                           const std::optional<StartPose>& start) {
   if (points.size() < 2) return invalid("time_s", "must have at least 2 points");
-  if (points.front().time_s == points.back().time_s) return invalid("time_s", "must last longer than 0 s");
   MotionSpan span(model, payload_kg, start.has_value());
   Cvode cvode(motion_state_size, span);
   const std::span<double> y = cvode.state();
@@ -130,6 +129,7 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
     TRY(cvode.advance(0, duration));
   }
 
+  if (points.front().time_s == points.back().time_s) return invalid("time_s", "must last longer than 0 s");
   signals::Accounts a;
   book(y.first<account::count>(), a);
   a.duration_s = points.back().time_s - points.front().time_s;

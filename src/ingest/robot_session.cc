@@ -211,7 +211,7 @@ void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_ut
     return;
   contradictions_->hear();
   if (const auto fault = telemetry::check_plausible(sample)) {
-    ++implausible_;
+    if (sample.sequence > counted_) ++implausible_, counted_ = sample.sequence;
     return on_fault(IngestFault::implausible, 1, telemetry::describe(*fault));
   }
   if (is_too_far_ahead(sample.utime_us, host_utime_us)) return;
@@ -323,9 +323,12 @@ void RobotSession::place(const signals::Sample& sample) {
   const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
   // What the daemon left out is counted as such.
   const std::int64_t refused = std::min(place.missing, implausible_),
-                     thinned = std::min(place.missing - refused, one_of_ - 1),
+                     thinned = std::min(place.missing - refused, (one_of_ - 1) * (refused + 1)),
                      missing = place.missing - refused - thinned;
-  implausible_ -= refused;
+  const bool begins =
+      place.arrival == telemetry::Arrival::first || place.arrival == telemetry::Arrival::restart;
+  implausible_ = begins ? 0 : implausible_ - refused;
+  counted_ = begins ? sample.sequence : std::max(counted_, sample.sequence);
   if (thinned > 0)
     note_fault(IngestFault::queue_full, static_cast<std::uint64_t>(thinned), {}, snapshot_.received_utime_us);
   if (missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(missing));

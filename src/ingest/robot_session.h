@@ -188,6 +188,7 @@ class RobotSession {
   SampleOrder order_;
   std::int64_t one_of_ = 1;       // of the last sample
   std::int64_t implausible_ = 0;  // samples that no later sample has been found to miss
+  std::int64_t counted_ = -1;     // the highest sequence number placed or refused as implausible
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;

@@ -148,7 +148,7 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
   if (log.unreadable > 0)
     set->notes.push_back(
         fmt::format("{} messages or values could not be read, exceed a limit or are duplicates{}{}",
-                    log.unreadable, beyond_ranges.empty() ? "" : "; ", beyond_ranges));
+                    log.unreadable, beyond_ranges.empty() ? "" : "; of these ", beyond_ranges));
   if (log.samples_outside > 0)
     set->notes.push_back(fmt::format(
         "{} samples before a mission's start or just after its end were left out", log.samples_outside));

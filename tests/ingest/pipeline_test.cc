@@ -250,10 +250,25 @@ TEST_F(PipelineTest, RejectsInfiniteAndAbsurdValues) {
   blind.wheel_velocity_rad_s[1] = NAN;
   send(blind);
   send_range(53, 100);
-  send(event(MissionPhase::finished, 101));
   EXPECT_EQ(harness.faults(IngestFault::implausible), 3u);
   EXPECT_EQ(harness.faults(IngestFault::missing), 0u);
+  send(event(MissionPhase::finished, 101));
   EXPECT_NEAR(harness.missions().at(0).accounts.measured_j, 48 * 99 * 0.02, 1e-6);
+}
+
+TEST_F(PipelineTest, ImplausibleSamplesHideNoLoss) {
+  Sample absurd = sample(0);
+  absurd.wheel_velocity_rad_s[0] = 1e9;
+  send(absurd);
+  send(event(MissionPhase::started, 1));
+  send_range(1, 50);
+  absurd.sequence = 50;
+  send(absurd);
+  send(absurd);
+  send_range(54, 100);
+  send_range(101, 200);
+  EXPECT_EQ(harness.faults(IngestFault::implausible), 3u);
+  EXPECT_EQ(harness.faults(IngestFault::missing), 3u + 1u);
 }
 
 TEST_F(PipelineTest, SilenceMakesTheMissionIncomplete) {

@@ -26,9 +26,9 @@ using test::RawReply;
 class Recorder : public ServerObserver {
  public:
   void exchanged(const Exchange& exchange) override {
-    ++exchanges;
     last_status = exchange.status;
     streams += exchange.stream;
+    ++exchanges;
   }
   void refused(Refusal refusal) override { ++refusals[static_cast<std::size_t>(refusal)]; }
   void connections(std::size_t count) override { open = count; }

@@ -177,10 +177,12 @@ class Variables {
   std::span<const Window> at_;
 };
 
-// Each row of z times its `by`, without any multiple of `by`: a constant is an effect.
-Eigen::MatrixXd varying(const Eigen::MatrixXd& z, const Eigen::VectorXd& by) {
+// Each row of z times its `by`, without the multiple of `by` that is in the rows that `count` (1, else 0): a
+// constant is an effect.
+Eigen::MatrixXd varying(const Eigen::MatrixXd& z, const Eigen::VectorXd& by, const Eigen::VectorXd& count) {
+  const Eigen::VectorXd counted = by.cwiseProduct(count);
   const Eigen::MatrixXd product = by.asDiagonal() * z;
-  return product - by * (by.transpose() * product / std::max(by.squaredNorm(), 1e-300));
+  return product - by * (counted.transpose() * product / std::max(counted.squaredNorm(), 1e-300));
 }
 
 Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
@@ -194,11 +196,15 @@ Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
 void add_motor_functions(const Data& d, const std::map<std::string, Eigen::MatrixXd>& bases,
                          const Variables& v, std::vector<Function>& out) {
   const robot::Motor& m = d.robot.motor;
-  std::array<Eigen::VectorXd, 2> way, amps, turns;
+  std::array<Eigen::VectorXd, 2> way, loaded, amps, turns;
   double per_amp = 0, size = 0;
   for (const std::size_t s : {0u, 1u}) {
-    way[s] =
-        v.column([s](const Window& w) { return w.moving[s] ? std::copysign(1.0, w.speed_rad_s[s]) : 0.0; });
+    way[s] = v.column([s](const Window& w) {
+      return w.resting[s] || w.speed_rad_s[s] == 0 ? 0.0 : std::copysign(1.0, w.speed_rad_s[s]);
+    });
+    loaded[s] = v.column([s](const Window& w) {
+      return w.moving[s] && !w.motors_apart && std::isfinite(w.current_a[s]) ? 1.0 : 0.0;
+    });
     amps[s] = v.column([s](const Window& w) { return w.current_a[s]; });
     turns[s] = v.column([s](const Window& w) { return w.speed_rad_s[s]; });
     per_amp += (m.voltage_constant_v_s_rad * m.gear_ratio * turns[s] + 2 * m.resistance_ohm * amps[s])
@@ -208,12 +214,17 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   }
   const double torque_unit = d.mean_power_w / std::max(per_amp, 1e-9);
   const double voltage_unit = d.mean_power_w / std::max(size, 1e-9);
-  const Eigen::VectorXd metered =
-      v.column([](const Window& w) { return std::isfinite(w.battery_power_w) ? 1.0 : 0.0; });
+  const Eigen::VectorXd metered = v.column([](const Window& w) {
+    return std::isfinite(w.battery_power_w + w.motor_power_w[0] + w.motor_power_w[1]) ? 1.0 : 0.0;
+  });
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(metered.size());
   const auto add = [&](const std::string& name, const Eigen::MatrixXd& z, bool repeats) {
-    out.push_back({Channel::bus, name, {varying(z, metered), {}}, d.mean_power_w, repeats});
-    out.push_back(
-        {Channel::torque_right, name, {varying(z, way[0]), varying(z, way[1])}, torque_unit, repeats});
+    out.push_back({Channel::bus, name, {varying(z, ones, metered), {}}, d.mean_power_w, repeats});
+    out.push_back({Channel::torque_right,
+                   name,
+                   {varying(z, way[0], loaded[0]), varying(z, way[1], loaded[1])},
+                   torque_unit,
+                   repeats});
   };
   add("time", v.intervals(), false);
   for (const auto& [name, z] : bases) add(name, z, true);
@@ -283,11 +294,9 @@ std::vector<Function> make_functions(const Data& d) {
   if (!out.empty() || d.witness == Witness::terminals) return out;
   const Variables of_windows(d, d.windows);
   if (d.at_readings()) {
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(ix(d.rows.size()));
     for (const auto& [name, z] : Variables(d, d.rows.instants).bases())
-      out.push_back({Channel::power,
-                     name,
-                     {varying(row_means(d.rows, z), Eigen::VectorXd::Ones(ix(d.rows.size()))), {}},
-                     d.mean_power_w});
+      out.push_back({Channel::power, name, {varying(row_means(d.rows, z), ones, ones), {}}, d.mean_power_w});
   } else if (d.motors) {
     add_motor_functions(d, of_windows.bases(), of_windows, out);
   }
