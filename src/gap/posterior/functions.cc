@@ -177,14 +177,6 @@ class Variables {
   std::span<const Window> at_;
 };
 
-// Each row of z times its `by`, without the multiple of `by` that is in the rows that `count` (1, else 0): a
-// constant is an effect.
-Eigen::MatrixXd varying(const Eigen::MatrixXd& z, const Eigen::VectorXd& by, const Eigen::VectorXd& count) {
-  const Eigen::VectorXd counted = by.cwiseProduct(count);
-  const Eigen::MatrixXd product = by.asDiagonal() * z;
-  return product - by * (counted.transpose() * product / std::max(counted.squaredNorm(), 1e-300));
-}
-
 Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
   Eigen::MatrixXd out(ix(rows.size()), z.cols());
   for (std::size_t r = 0; r < rows.size(); ++r)
@@ -196,14 +188,11 @@ Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
 void add_motor_functions(const Data& d, const std::map<std::string, Eigen::MatrixXd>& bases,
                          const Variables& v, std::vector<Function>& out) {
   const robot::Motor& m = d.robot.motor;
-  std::array<Eigen::VectorXd, 2> way, loaded, amps, turns;
+  std::array<Eigen::VectorXd, 2> way, amps, turns;
   double per_amp = 0, size = 0;
   for (const std::size_t s : {0u, 1u}) {
     way[s] = v.column([s](const Window& w) {
       return w.resting[s] || w.speed_rad_s[s] == 0 ? 0.0 : std::copysign(1.0, w.speed_rad_s[s]);
-    });
-    loaded[s] = v.column([s](const Window& w) {
-      return w.moving[s] && !w.motors_apart && std::isfinite(w.current_a[s]) ? 1.0 : 0.0;
     });
     amps[s] = v.column([s](const Window& w) { return w.current_a[s]; });
     turns[s] = v.column([s](const Window& w) { return w.speed_rad_s[s]; });
@@ -214,20 +203,16 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   }
   const double torque_unit = d.mean_power_w / std::max(per_amp, 1e-9);
   const double voltage_unit = d.mean_power_w / std::max(size, 1e-9);
-  const Eigen::VectorXd metered = v.column([](const Window& w) {
-    return std::isfinite(w.battery_power_w + w.motor_power_w[0] + w.motor_power_w[1]) ? 1.0 : 0.0;
-  });
-  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(metered.size());
-  const auto add = [&](const std::string& name, const Eigen::MatrixXd& z, bool repeats) {
-    out.push_back({Channel::bus, name, {varying(z, ones, metered), {}}, d.mean_power_w, repeats});
-    out.push_back({Channel::torque_right,
-                   name,
-                   {varying(z, way[0], loaded[0]), varying(z, way[1], loaded[1])},
-                   torque_unit,
-                   repeats});
+  const auto each = [](const Eigen::MatrixXd& z, const std::array<Eigen::VectorXd, 2>& by) {
+    return std::array<Eigen::MatrixXd, 2>{by[0].asDiagonal() * z, by[1].asDiagonal() * z};
   };
-  add("time", v.intervals(), false);
-  for (const auto& [name, z] : bases) add(name, z, true);
+  const Eigen::MatrixXd intervals = v.intervals();
+  out.push_back({Channel::bus, "time", {intervals, {}}, d.mean_power_w, false});
+  out.push_back({Channel::torque_right, "time", each(intervals, way), torque_unit, false});
+  for (const auto& [name, z] : bases) {
+    out.push_back({Channel::bus, name, {z, {}}, d.mean_power_w});
+    out.push_back({Channel::torque_right, name, each(z, way), torque_unit});
+  }
   const double most_a = std::max({amps[0].cwiseAbs().maxCoeff(), amps[1].cwiseAbs().maxCoeff(), 1e-9});
   const double most_rad_s = std::max({turns[0].cwiseAbs().maxCoeff(), turns[1].cwiseAbs().maxCoeff(), 1e-9});
   const auto bends = [](const std::array<Eigen::VectorXd, 2>& of, double most) {
@@ -241,11 +226,7 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   };
   out.push_back({Channel::voltage_right, "speed", bends(turns, most_rad_s), voltage_unit});
   out.push_back({Channel::voltage_right, "current", bends(amps, most_a), voltage_unit});
-  const Eigen::MatrixXd decays = v.times() / most_a;
-  out.push_back({Channel::voltage_right,
-                 "time",
-                 {amps[0].asDiagonal() * decays, amps[1].asDiagonal() * decays},
-                 voltage_unit});
+  out.push_back({Channel::voltage_right, "time", each(v.times() / most_a, amps), voltage_unit});
 }
 
 void add_kinematic_functions(const Data& d, const Variables& v, std::vector<Function>& out) {
@@ -294,9 +275,12 @@ std::vector<Function> make_functions(const Data& d) {
   if (!out.empty() || d.witness == Witness::terminals) return out;
   const Variables of_windows(d, d.windows);
   if (d.at_readings()) {
-    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(ix(d.rows.size()));
-    for (const auto& [name, z] : Variables(d, d.rows.instants).bases())
-      out.push_back({Channel::power, name, {varying(row_means(d.rows, z), ones, ones), {}}, d.mean_power_w});
+    for (const auto& [name, z] : Variables(d, d.rows.instants).bases()) {
+      const Eigen::MatrixXd of_rows = row_means(d.rows, z);
+      // Without its mean: a constant is an effect.
+      out.push_back(
+          {Channel::power, name, {of_rows.rowwise() - of_rows.colwise().mean(), {}}, d.mean_power_w});
+    }
   } else if (d.motors) {
     add_motor_functions(d, of_windows.bases(), of_windows, out);
   }
