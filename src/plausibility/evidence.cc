@@ -217,6 +217,8 @@ class Gatherer {
         c_.coefficient(Relation::sag, 0, {1}) * (-1 / robot_.battery.internal_resistance_ohm), resistance_off,
         8, {{battery_voltage, 1}, {battery_current, -1}}, {.heavy_tails = true});
     const Powers power{{battery_voltage, 1}, {battery_current, 1}};
+    add("with the motion, the battery's power changes by", "what the model gives",
+        c_.coefficient(Relation::motion, 0, {1, 2}), anything, 6, power);
     moved_power(power);
     // Signs that need no model: a robot that drives without braking consumes power, except downhill; a
     // standing robot consumes power unless it is charged. With long descents and no pitch readings,

@@ -190,6 +190,7 @@ void Observer::take_power(const Cell& c) {
   const auto flow = model_.flow(at);
   const double modelled = flow.battery_power_w, idle = flow.ledger[signals::Term::accessories];
   relate(Relation::motors, {vb, ib, vr, vl, ir, il}, {c.battery_power_w, c.motor_power_w, 1.0});
+  relate(Relation::motion, {wr, wl, vb, ib}, {c.battery_power_w, modelled, 1.0});
   const double current_change = c.mean[ib] - battery_[1];
   const bool braking = std::max(battery_[2], modelled - idle) < 0;
   relate(Relation::sag, {vb, ib}, {c.mean[vb] - battery_[0], current_change, braking ? current_change : 0.0});

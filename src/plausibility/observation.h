@@ -34,6 +34,7 @@ enum class Relation : std::size_t {
             // steady speed and for acceleration on wheels of double the radius, the same on wheels of half
             // the radius; where the model has no braking
   idle,     // battery power, 1; standing
+  motion,   // battery power, the model's, 1
   sag,      // changes of the battery's voltage, of its current, from one cell to the next; the
             // latter again, or 0 unless the motors brake in both
   climb,    // battery power less the model's, m g v sin(pitch), 1
