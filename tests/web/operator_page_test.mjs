@@ -1165,13 +1165,16 @@ await check('impossible time savings are not offered', async () => {
 });
 
 await check('a deadline of the front is met; charge limits it', async () => {
-  const duration = page.locator('.front-pick .number');
-  const slowest = await duration.innerText();
+  const point = page.locator('.front-pick .number');
+  const energyOf = (text) => Number.parseFloat(text.split('·')[1]);
+  const slowest = await point.innerText();
   await page.getByRole('slider').press('Home');
-  await duration.filter({ hasNotText: slowest }).waitFor();
-  const fastest = await duration.innerText();
-  expect(Number.parseFloat(fastest) < Number.parseFloat(slowest), `${fastest} left of ${slowest}`);
-  await page.keyboard.press('ArrowRight');
+  await point.filter({ hasNotText: slowest }).waitFor();
+  const fastest = await point.innerText();
+  expect(energyOf(fastest) > energyOf(slowest), `${fastest} left of ${slowest}`);
+  await page.keyboard.press('End');
+  await point.filter({ hasText: slowest }).waitFor();
+  await page.keyboard.press('ArrowLeft');
   const again = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByRole('button', { name: 'Use as deadline' }).click();
   const answer = await (await again).json();
