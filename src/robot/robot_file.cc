@@ -10,6 +10,7 @@
 #include "base/json_text.h"
 #include "base/overloaded.h"
 #include "base/text_file.h"
+#include "base/try.h"
 #include "robot/robot_fields.h"
 
 namespace joulecast::robot {
@@ -18,7 +19,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t max_file_bytes = 1 << 20;
-constexpr std::string_view battery_prefix = "/battery";
 
 // Collects problems; a pointer that has one is not reported again by later checks.
 class Problems {
@@ -66,17 +66,27 @@ bool is_kind(bool fits, std::string_view kind, const Json& value, const std::str
   return fits;
 }
 
-std::optional<double> number(const Json& value, const std::string& pointer, Problems& problems) {
+// Also of a number out of bounds, which is a problem.
+std::optional<double> number(const Json& value, const std::string& pointer, const Bounds& bounds,
+                             std::string_view key, Problems& problems) {
   if (!is_kind(value.is_number(), "a number", value, pointer, problems)) return std::nullopt;
-  return value.get<double>();
+  const double given = value.get<double>();
+  if (!std::isfinite(given) || !bounds.contain(given))
+    problems.add(pointer, out_of_bounds(given, bounds, unit_of(key)));
+  return given;
 }
 
 std::optional<std::vector<double>> numbers(const Json& value, const std::string& pointer,
-                                           Problems& problems) {
+                                           const Bounds& bounds, std::string_view key, Problems& problems) {
   if (!is_kind(value.is_array(), "an array of numbers", value, pointer, problems)) return std::nullopt;
+  if (value.size() > max_curve_points) {
+    problems.add(pointer,
+                 fmt::format("has {} numbers, must have at most {}", value.size(), max_curve_points));
+    return std::nullopt;
+  }
   std::vector<double> out;
   for (std::size_t i = 0; i < value.size(); ++i) {
-    const auto element = number(value[i], fmt::format("{}/{}", pointer, i), problems);
+    const auto element = number(value[i], fmt::format("{}/{}", pointer, i), bounds, key, problems);
     if (!element) return std::nullopt;
     out.push_back(*element);
   }
@@ -92,22 +102,28 @@ bool object_of(const Json& value, const std::string& pointer, const std::set<std
   return true;
 }
 
-// ---- reading: shapes into the model ----
+// ---- reading: shapes into the model, with the bounds of their values ----
 
-void read(const Json& value, const std::string& pointer, std::string& out, Problems& problems) {
-  if (is_kind(value.is_string(), "a string", value, pointer, problems)) out = value.get<std::string>();
+void read(const Json& value, const std::string& pointer, const Field&, std::string& out, Problems& problems) {
+  if (!is_kind(value.is_string(), "a string", value, pointer, problems)) return;
+  out = value.get<std::string>();
+  if (!is_robot_id(out))
+    problems.add(pointer, fmt::format("is \"{}\", must match {}", out.substr(0, 80), robot_id_pattern));
 }
 
-void read(const Json& value, const std::string& pointer, double& out, Problems& problems) {
-  if (const auto read_value = number(value, pointer, problems)) out = *read_value;
+void read(const Json& value, const std::string& pointer, const Field& field, double& out,
+          Problems& problems) {
+  out = number(value, pointer, field.bounds, field.key(), problems).value_or(out);
 }
 
-void read(const Json& value, const std::string& pointer, std::optional<double>& out, Problems& problems) {
-  out = number(value, pointer, problems);
+void read(const Json& value, const std::string& pointer, const Field& field, std::optional<double>& out,
+          Problems& problems) {
+  out = number(value, pointer, field.bounds, field.key(), problems);
 }
 
-void read(const Json& value, const std::string& pointer, std::array<double, 2>& out, Problems& problems) {
-  const auto both = numbers(value, pointer, problems);
+void read(const Json& value, const std::string& pointer, const Field& field, std::array<double, 2>& out,
+          Problems& problems) {
+  const auto both = numbers(value, pointer, field.bounds, field.key(), problems);
   if (!both) return;
   if (both->size() != 2) {
     problems.add(pointer, fmt::format("has {} numbers, must have 2: [right, left]", both->size()));
@@ -116,31 +132,40 @@ void read(const Json& value, const std::string& pointer, std::array<double, 2>& 
   std::copy(both->begin(), both->end(), out.begin());
 }
 
-void read_curve(const Json& value, const std::string& pointer, std::string_view value_key, Curve& out,
-                Problems& problems) {
-  if (!object_of(value, pointer, {"charge", value_key}, problems)) return;
-  std::optional<std::vector<double>> columns[2];
-  const std::string keys[2] = {"charge", std::string(value_key)};
-  for (std::size_t i = 0; i < 2; ++i) {
-    const std::string column = pointer + "/" + keys[i];
-    if (!value.contains(keys[i]))
-      problems.add(column, "is missing");
-    else
-      columns[i] = numbers(value[keys[i]], column, problems);
-  }
-  if (!columns[0] || !columns[1]) return;
-  if (columns[0]->size() != columns[1]->size()) {
-    problems.add(pointer, fmt::format("has {} charge but {} {} numbers, must have as many of each",
-                                      columns[0]->size(), columns[1]->size(), value_key));
+void read(const Json& value, const std::string& pointer, const Field& field, Curve& out, Problems& problems) {
+  if (!object_of(value, pointer, {"charge", field.value_key}, problems)) return;
+  const auto column = [&](std::string_view key, const Bounds& bounds) -> std::optional<std::vector<double>> {
+    const std::string at = child(pointer, key);
+    if (const auto found = value.find(key); found != value.end())
+      return numbers(*found, at, bounds, key, problems);
+    problems.add(at, "is missing");
+    return std::nullopt;
+  };
+  const auto charge = column("charge", fraction), values = column(field.value_key, field.bounds);
+  if (!charge || !values) return;
+  const std::size_t count = charge->size();
+  if (values->size() != count) {
+    problems.add(pointer, fmt::format("has {} charge but {} {} numbers, must have as many of each", count,
+                                      values->size(), field.value_key));
     return;
   }
-  for (std::size_t i = 0; i < columns[0]->size(); ++i) out.emplace_back((*columns[0])[i], (*columns[1])[i]);
-  if (out.empty()) problems.add(pointer, "has no points, must have at least 2");
+  if (count < 2)
+    problems.add(pointer, fmt::format("has {} points, must have 2 to {}", count, max_curve_points));
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0 && !((*charge)[i] > (*charge)[i - 1]))
+      problems.add(
+          fmt::format("{}/charge/{}", pointer, i),
+          fmt::format("is {}, must be greater than the one before, {}", (*charge)[i], (*charge)[i - 1]));
+    out.emplace_back((*charge)[i], (*values)[i]);
+  }
 }
 
 template <class Element>
-void read(const Json& value, const std::string& pointer, std::vector<Element>& out, Problems& problems) {
+void read(const Json& value, const std::string& pointer, const Field&, std::vector<Element>& out,
+          Problems& problems) {
   if (!is_kind(value.is_array(), "an array of objects", value, pointer, problems)) return;
+  if (value.size() > max_branches)
+    problems.add(pointer, fmt::format("has {} elements, must have at most {}", value.size(), max_branches));
   std::set<std::string_view> known;
   for (const auto& field : element_fields<Element>()) known.insert(field.key);
   for (std::size_t i = 0; i < value.size(); ++i) {
@@ -148,123 +173,41 @@ void read(const Json& value, const std::string& pointer, std::vector<Element>& o
     Element& element = out.emplace_back();
     if (!object_of(value[i], element_pointer, known, problems)) continue;
     for (const auto& field : element_fields<Element>()) {
-      const std::string member = fmt::format("{}/{}", element_pointer, field.key);
-      const auto found = value[i].find(field.key);
-      if (found == value[i].end()) {
+      const std::string member = child(element_pointer, field.key);
+      if (const auto found = value[i].find(field.key); found == value[i].end())
         problems.add(member, "is missing");
-      } else {
-        read(*found, member, element.*field.member, problems);
-      }
+      else if (const auto given = number(*found, member, field.bounds, field.key, problems))
+        element.*field.member = *given;
     }
   }
 }
 
-void read(const Json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
+void read(const Json& value, const std::string& pointer, const Field&, std::vector<AdoptedEffect>& out,
           Problems& problems) {
   if (!is_kind(value.is_object(), "an object", value, pointer, problems)) return;
+  if (value.size() > max_effects)
+    problems.add(pointer, fmt::format("has {} effects, must have at most {}", value.size(), max_effects));
   for (const auto& [id, parameters] : value.items()) {
     const std::string effect_pointer = child(pointer, id);
     AdoptedEffect& effect = out.emplace_back();
     effect.id = id;
-    if (!is_kind(parameters.is_object(), "an object", parameters, effect_pointer, problems)) continue;
-    for (const auto& [name, parameter] : parameters.items()) {
-      const std::string name_pointer = child(effect_pointer, name);
-      if (const auto read_value = number(parameter, name_pointer, problems))
-        effect.parameters.emplace_back(name, *read_value);
-    }
-  }
-}
-
-// ---- checking: bounds of every field, then constraints between fields ----
-
-void check_bounds(double value, const Bounds& bounds, const std::string& pointer, std::string_view name,
-                  Problems& problems) {
-  if (!bounds.contain(value)) problems.add(pointer, out_of_bounds(value, bounds, unit_of(name)));
-}
-
-void check_curve(const Curve& curve, const Field& field, const std::string& pointer, Problems& problems) {
-  if (curve.empty()) return;
-  if (curve.size() < 2 || curve.size() > max_curve_points) {
-    problems.add(pointer, fmt::format("has {} points, must have 2 to {}", curve.size(), max_curve_points));
-    return;
-  }
-  for (std::size_t i = 0; i < curve.size(); ++i) {
-    const std::string charge_pointer = fmt::format("{}/charge/{}", pointer, i);
-    check_bounds(curve[i].first, fraction, charge_pointer, "charge", problems);
-    check_bounds(curve[i].second, field.bounds, fmt::format("{}/{}/{}", pointer, field.value_key, i),
-                 field.value_key, problems);
-    if (i > 0 && !(curve[i].first > curve[i - 1].first))
-      problems.add(charge_pointer, fmt::format("is {}, must be greater than the one before, {}",
-                                               curve[i].first, curve[i - 1].first));
-  }
-}
-
-template <class Element>
-void check(const std::vector<Element>& elements, const std::string& pointer, Problems& problems) {
-  if (elements.size() > max_branches) {
-    problems.add(pointer,
-                 fmt::format("has {} elements, must have at most {}", elements.size(), max_branches));
-  }
-  for (std::size_t i = 0; i < elements.size(); ++i) {
-    for (const auto& field : element_fields<Element>()) {
-      check_bounds(elements[i].*field.member, field.bounds, fmt::format("{}/{}/{}", pointer, i, field.key),
-                   field.key, problems);
-    }
-  }
-}
-
-void check(const std::vector<AdoptedEffect>& effects, const std::string& pointer, Problems& problems) {
-  if (effects.size() > max_effects)
-    problems.add(pointer, fmt::format("has {} effects, must have at most {}", effects.size(), max_effects));
-  std::set<std::string_view> ids;
-  for (const AdoptedEffect& effect : effects) {
-    const std::string effect_pointer = child(pointer, effect.id);
-    if (!is_effect_name(effect.id))
+    if (!is_effect_name(id))
       problems.add(effect_pointer, fmt::format("is no effect id, must match {}", effect_name_pattern));
-    if (!ids.insert(effect.id).second) problems.add(effect_pointer, "is given twice");
-    if (effect.parameters.size() > max_effect_parameters)
-      problems.add(effect_pointer, fmt::format("has {} parameters, must have at most {}",
-                                               effect.parameters.size(), max_effect_parameters));
-    std::set<std::string_view> names;
-    for (const auto& [name, value] : effect.parameters) {
+    if (!is_kind(parameters.is_object(), "an object", parameters, effect_pointer, problems)) continue;
+    if (parameters.size() > max_effect_parameters)
+      problems.add(effect_pointer, fmt::format("has {} parameters, must have at most {}", parameters.size(),
+                                               max_effect_parameters));
+    for (const auto& [name, parameter] : parameters.items()) {
       const std::string name_pointer = child(effect_pointer, name);
       if (!is_effect_name(name))
         problems.add(name_pointer, fmt::format("is no parameter name, must match {}", effect_name_pattern));
-      if (!names.insert(name).second) problems.add(name_pointer, "is given twice");
-      if (!std::isfinite(value))
-        problems.add(name_pointer, fmt::format("is {}, must be a finite number", value));
+      if (const auto given = number(parameter, name_pointer, {}, {}, problems))
+        effect.parameters.emplace_back(name, *given);
     }
   }
 }
 
-void check_field(const Field& field, RobotModel& model, Problems& problems) {
-  const std::string pointer(field.pointer);
-  if (problems.at(pointer)) return;
-  std::visit(Overloaded{
-                 [&](std::string& (*member)(RobotModel&)) {
-                   if (!is_robot_id(member(model)))
-                     problems.add(pointer, fmt::format("is \"{}\", must match {}",
-                                                       member(model).substr(0, 80), robot_id_pattern));
-                 },
-                 [&](double& (*member)(RobotModel&)) {
-                   check_bounds(member(model), field.bounds, pointer, field.key(), problems);
-                 },
-                 [&](std::optional<double>& (*member)(RobotModel&)) {
-                   if (member(model))
-                     check_bounds(*member(model), field.bounds, pointer, field.key(), problems);
-                 },
-                 [&](std::array<double, 2>& (*member)(RobotModel&)) {
-                   for (std::size_t side = 0; side < 2; ++side)
-                     check_bounds(member(model)[side], field.bounds, fmt::format("{}/{}", pointer, side),
-                                  field.key(), problems);
-                 },
-                 [&](Curve& (*member)(RobotModel&)) { check_curve(member(model), field, pointer, problems); },
-                 [&]<class Element>(std::vector<Element>& (*member)(RobotModel&)) {
-                   check(member(model), pointer, problems);
-                 },
-             },
-             field.member);
-}
+// ---- constraints between fields ----
 
 // Parallel-axis bound: the chassis's mass centre sits d ahead of the axle, the wheels at l to both sides of
 // its middle.
@@ -323,23 +266,7 @@ void check_idle_power(const RobotModel& model, Problems& problems) {
                                               model.idle_power_w, most));
 }
 
-void check_robot(RobotModel& model, Problems& problems) {
-  for (const Field& field : fields()) check_field(field, model, problems);
-  check_inertia(model, problems);
-  check_battery(model.battery, problems);
-  check_idle_power(model, problems);
-}
-
 // ---- the document as a whole ----
-
-void read_field(const Field& field, const Json& value, RobotModel& model, Problems& problems) {
-  const std::string pointer(field.pointer);
-  std::visit(Overloaded{[&](Curve& (*member)(RobotModel&)) {
-                          read_curve(value, pointer, field.value_key, member(model), problems);
-                        },
-                        [&](auto member) { read(value, pointer, member(model), problems); }},
-             field.member);
-}
 
 bool is_battery_field(const Field& field) {
   return field.pointer.starts_with("/battery/");
@@ -356,35 +283,30 @@ std::set<std::string_view> keys_below(std::string_view object_pointer) {
   return keys;
 }
 
-// Reads the rows of the table that `wanted` selects from a document with its root at `root` of a robot
-// file.
+// Reads the rows of the table that `wanted` selects.
 template <class Wanted>
-void read_document(const Json& document, std::string_view root, Wanted wanted, RobotModel& model,
-                   Problems& problems) {
-  const std::string root_pointer(root);
-  if (!object_of(document, root_pointer, keys_below(root), problems)) return;
-  std::set<std::string_view> visited{root};
+void read_document(const Json& document, Wanted wanted, RobotModel& model, Problems& problems) {
+  if (!object_of(document, "", keys_below(""), problems)) return;
+  std::set<std::string_view> visited;
   for (const Field& field : fields()) {
     if (!wanted(field)) continue;
     const std::string_view parent = field.pointer.substr(0, field.pointer.rfind('/'));
     const Json* object = &document;
-    if (parent != root) {
-      const std::string key(parent.substr(root.size() + 1));
-      const auto found = document.find(key);
+    if (!parent.empty()) {
+      const auto found = document.find(parent.substr(1));
       if (found == document.end()) {
         problems.add(std::string(parent), "is missing");
         continue;
       }
-      const bool first_visit = visited.insert(parent).second;
-      if (first_visit) object_of(*found, std::string(parent), keys_below(parent), problems);
+      if (visited.insert(parent).second) object_of(*found, std::string(parent), keys_below(parent), problems);
       if (!found->is_object()) continue;
       object = &*found;
     }
-    const auto value = object->find(field.key());
-    if (value != object->end())
-      read_field(field, *value, model, problems);
+    const std::string pointer(field.pointer);
+    if (const auto value = object->find(field.key()); value != object->end())
+      std::visit([&](auto member) { read(*value, pointer, field, member(model), problems); }, field.member);
     else if (field.presence == Presence::required)
-      problems.add(std::string(field.pointer), "is missing");
+      problems.add(pointer, "is missing");
   }
 }
 
@@ -398,17 +320,17 @@ Result<Json> parse_text(std::string_view text) {
 RobotModel read_robot(const Json& document, Problems& problems) {
   RobotModel model;
   read_document(
-      document, "", [](const Field&) { return true; }, model, problems);
-  check_robot(model, problems);
+      document, [](const Field&) { return true; }, model, problems);
+  check_inertia(model, problems);
+  check_battery(model.battery, problems);
+  check_idle_power(model, problems);
   return model;
 }
 
 Result<Battery> parse_battery_document(const Json& document) {
   Problems problems;
   RobotModel model;
-  read_document(document, battery_prefix, is_battery_field, model, problems);
-  for (const Field& field : fields())
-    if (is_battery_field(field)) check_field(field, model, problems);
+  read_document(Json::object({{"battery", document}}), is_battery_field, model, problems);
   check_battery(model.battery, problems);
   if (!problems.none()) return tl::unexpected(problems.error());
   return model.battery;
@@ -500,10 +422,14 @@ Result<RobotModel> load_robot(const std::filesystem::path& path) {
 }
 
 Result<void> validate(const RobotModel& model) {
-  Problems problems;
-  RobotModel copy = model;
-  check_robot(copy, problems);
-  if (!problems.none()) return tl::unexpected(problems.error());
+  const auto keys_of_effects = [](const RobotModel& of) {
+    std::size_t count = of.effects.size();
+    for (const AdoptedEffect& effect : of.effects) count += effect.parameters.size();
+    return count;
+  };
+  TRY_ASSIGN(const RobotModel again, read_robot(robot_to_json(model)));
+  if (keys_of_effects(again) != keys_of_effects(model))
+    return invalid("/effects", "has an effect, or an effect a parameter, twice");
   return {};
 }
 
