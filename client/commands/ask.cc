@@ -21,7 +21,7 @@
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
-#include "client/profile_drawing.h"
+#include "report/profile_drawing.h"
 #include "robot/robot_file.h"
 
 // The commands profile, estimate and autonomy: answers for one robot, computed here from a robot file or by a
@@ -120,7 +120,7 @@ Result<void> plot(const AskOptions& options, const Question& question, Json requ
   if (!given) request["baseline_columns"] = true;
   TRY_ASSIGN(const auto text, answer(options, given ? question : profile, request));
   TRY_ASSIGN(const auto document, object_of(text, options.server));
-  TRY_ASSIGN(const auto drawing, draw_answer(document));
+  TRY_ASSIGN(const auto drawing, report::draw_answer(document));
   return write_text_file(options.plot_file, drawing, existing(options.force));
 }
 

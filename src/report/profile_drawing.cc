@@ -4,6 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "base/json_number.h"
 
 namespace joulecast::report {
 namespace {
@@ -18,20 +26,45 @@ constexpr std::string_view style_sheet =
     "stroke-width:2.4}.trapezoid{stroke:#d97706;stroke-width:1.8;stroke-dasharray:7 "
     "4}.triangle{stroke:#047857;stroke-width:2;stroke-dasharray:2 3}";
 
-using Values = std::vector<double> DrawnMotion::*;
+using Json = nlohmann::json;
 
-bool moves(const std::vector<double>& rates) {
-  return std::ranges::any_of(rates, [](double rate) { return std::fabs(rate) > 1e-9; });
+struct Motion {
+  std::string label;
+  std::string_view style;  // plan, trapezoid or triangle
+  std::map<std::string_view, std::vector<double>> columns = {};
+};
+
+// Empty without a profile in which all columns are as long.
+std::optional<Motion> motion_of(const Json& holder, std::string label, std::string_view style) {
+  Motion motion{std::move(label), style};
+  if (!holder.is_object() || !holder.contains("profile") || !holder["profile"].is_object())
+    return std::nullopt;
+  for (const char* name : {"time_s", "speed_m_s", "yaw_rate_rad_s", "power_w", "energy_j"}) {
+    std::vector<double>& column = motion.columns[name];
+    for (const Json& value : holder["profile"].value(name, Json::array()))
+      column.push_back(number_or_nan(value));
+    if (column.size() < 2 || column.size() != motion.columns["time_s"].size()) return std::nullopt;
+  }
+  return motion;
 }
 
-std::vector<std::pair<std::string_view, Values>> panels_of(std::span<const DrawnMotion> motions) {
-  const bool drives = std::ranges::any_of(motions, moves, &DrawnMotion::speed_m_s);
-  const bool turns = std::ranges::any_of(motions, moves, &DrawnMotion::yaw_rate_rad_s);
-  std::vector<std::pair<std::string_view, Values>> panels;
-  if (drives || !turns) panels.emplace_back("speed, m/s", &DrawnMotion::speed_m_s);
-  if (turns) panels.emplace_back("yaw rate to the left, rad/s", &DrawnMotion::yaw_rate_rad_s);
-  panels.emplace_back("power from the battery, W", &DrawnMotion::power_w);
-  panels.emplace_back("energy from the battery, J", &DrawnMotion::energy_j);
+struct Panel {
+  std::string_view column, title;
+};
+
+// Speed where a motion drives, yaw rate where one turns, power and energy.
+std::vector<Panel> panels_of(std::span<const Motion> motions) {
+  const auto moves = [&](std::string_view rate) {
+    return std::ranges::any_of(motions, [&](const Motion& motion) {
+      return std::ranges::any_of(motion.columns.at(rate), [](double v) { return std::fabs(v) > 1e-9; });
+    });
+  };
+  const bool turns = moves("yaw_rate_rad_s");
+  std::vector<Panel> panels;
+  if (!turns || moves("speed_m_s")) panels.push_back({"speed_m_s", "speed, m/s"});
+  if (turns) panels.push_back({"yaw_rate_rad_s", "yaw rate to the left, rad/s"});
+  panels.push_back({"power_w", "power from the battery, W"});
+  panels.push_back({"energy_j", "energy from the battery, J"});
   return panels;
 }
 
@@ -67,11 +100,10 @@ std::string label(double x, double y, std::string_view css, std::string_view wor
 }
 
 // The values of the motions over time; a line is interrupted where a value is not finite.
-std::string panel_of(std::string_view title, Values values, std::span<const DrawnMotion> motions,
-                     double end_s, double panel_top) {
+std::string drawn_panel(const Panel& panel, std::span<const Motion> motions, double end_s, double panel_top) {
   double low = 0, high = 0;
-  for (const DrawnMotion& m : motions)
-    for (const double v : m.*values)
+  for (const Motion& m : motions)
+    for (const double v : m.columns.at(panel.column))
       if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
   high += 0.04 * (high - low);
   if (!(high > low)) high = low + 1;
@@ -88,7 +120,7 @@ std::string panel_of(std::string_view title, Values values, std::span<const Draw
     out += label(x_of(tick), bottom + 15, "tick mid", fmt::format("{:.7g}", tick));
   out += label(left_px + width / 2, bottom + bottom_px - 6, "axis mid", "time, s");
   out += fmt::format("<text class=\"axis mid\" transform=\"translate({} {}) rotate(-90)\">{}</text>\n",
-                     px(12), px(top + height / 2), title);
+                     px(12), px(top + height / 2), panel.title);
   out += line(left_px, y_of(0), right, y_of(0), "zero");
   for (std::size_t k = motions.size(); k-- > 0;) {
     std::string points;
@@ -97,17 +129,49 @@ std::string panel_of(std::string_view title, Values values, std::span<const Draw
         out += fmt::format("<polyline points=\"{}\" class=\"{}\"/>\n", points, motions[k].style);
       points.clear();
     };
-    for (std::size_t i = 0; i < motions[k].time_s.size(); ++i) {
-      const double value = (motions[k].*values)[i];
-      if (std::isfinite(value))
-        points += fmt::format("{}{},{}", points.empty() ? "" : " ", px(x_of(motions[k].time_s[i])),
-                              px(y_of(value)));
+    const std::vector<double>&times = motions[k].columns.at("time_s"),
+          &values = motions[k].columns.at(panel.column);
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      if (std::isfinite(values[i]))
+        points += fmt::format("{}{},{}", points.empty() ? "" : " ", px(x_of(times[i])), px(y_of(values[i])));
       else
         end();
     }
     end();
   }
   return out;
+}
+
+std::string draw(std::string_view heading, std::span<const Motion> motions) {
+  double end_s = 0;
+  for (const Motion& m : motions) end_s = std::max(end_s, m.columns.at("time_s").back());
+  double top = head_px + line_px * static_cast<double>(motions.size());
+  const std::vector<Panel> panels = panels_of(motions);
+  const std::string height = px(top + panel_px * static_cast<double>(panels.size()));
+  std::string out = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
+      "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n<title>motion over time</title>\n"
+      "<style>{2}</style>\n<rect x=\"0\" y=\"0\" width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n"
+      "<text x=\"{3}\" y=\"28\" font-size=\"17\" fill=\"#222\" font-weight=\"bold\">{4}</text>\n",
+      px(width_px), height, style_sheet, px(left_px), escaped(heading));
+  double y = 50;
+  for (const Motion& m : motions) {
+    out += line(left_px, y - 4, left_px + 34, y - 4, m.style);
+    out += fmt::format("<text x=\"{}\" y=\"{}\" font-size=\"13\" fill=\"#222\">{}</text>\n", px(left_px + 42),
+                       px(y), escaped(m.label));
+    y += line_px;
+  }
+  for (const Panel& panel : panels) {
+    out += drawn_panel(panel, motions, end_s, top);
+    top += panel_px;
+  }
+  return out + "</svg>\n";
+}
+
+std::string baseline_label(const char* name, const Json& baseline) {
+  return fmt::format("{}, as long on every run: {:.1f} J; the plan saves {:.1f} %{}", name,
+                     number_at(baseline, "energy_j"), 100 * number_at(baseline, "saving_fraction"),
+                     baseline.value("within_limits", true) ? "" : " (breaks the robot's limits)");
 }
 
 }  // namespace
@@ -128,30 +192,24 @@ std::vector<double> ticks_of(double low, double high, int about) {
   return ticks;
 }
 
-std::string draw_profile(std::string_view heading, std::span<const DrawnMotion> motions) {
-  const auto panels = panels_of(motions);
-  double end_s = 0;
-  for (const DrawnMotion& m : motions) end_s = std::max(end_s, m.time_s.back());
-  double top = head_px + line_px * static_cast<double>(motions.size());
-  const std::string height = px(top + panel_px * static_cast<double>(panels.size()));
-  std::string out = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" "
-      "font-family=\"DejaVu Sans, Helvetica, Arial, sans-serif\">\n<title>motion over time</title>\n"
-      "<style>{2}</style>\n<rect x=\"0\" y=\"0\" width=\"{0}\" height=\"{1}\" fill=\"#fff\"/>\n"
-      "<text x=\"{3}\" y=\"28\" font-size=\"17\" fill=\"#222\" font-weight=\"bold\">{4}</text>\n",
-      px(width_px), height, style_sheet, px(left_px), escaped(heading));
-  double y = 50;
-  for (const DrawnMotion& m : motions) {
-    out += line(left_px, y - 4, left_px + 34, y - 4, m.style);
-    out += fmt::format("<text x=\"{}\" y=\"{}\" font-size=\"13\" fill=\"#222\">{}</text>\n", px(left_px + 42),
-                       px(y), escaped(m.label));
-    y += line_px;
+Result<std::string> draw_answer(const Json& answer) {
+  const auto baselines = answer.find("baselines");
+  const bool planned = baselines != answer.end() && baselines->is_object();
+  auto own = motion_of(
+      answer, fmt::format("{}: {:.1f} J", planned ? "least energy" : "motion", number_at(answer, "energy_j")),
+      "plan");
+  if (!own) return fail(Fault::corrupt, "profile", "the answer has no columns to draw");
+  std::vector<Motion> motions{std::move(*own)};
+  for (const char* name : {"trapezoid", "triangle"}) {
+    if (!planned || !baselines->value(name, Json()).is_object()) continue;
+    const Json& baseline = (*baselines)[name];
+    if (auto motion = motion_of(baseline, baseline_label(name, baseline), name))
+      motions.push_back(std::move(*motion));
   }
-  for (const auto& [title, values] : panels) {
-    out += panel_of(title, values, motions, end_s, top);
-    top += panel_px;
-  }
-  return out + "</svg>\n";
+  return draw(fmt::format("{}: {:.2f} m, {:.2f} rad turned, {:.2f} s",
+                          answer.value("robot_id", std::string("robot")), number_at(answer, "distance_m"),
+                          number_at(answer, "turned_rad"), number_at(answer, "duration_s")),
+              motions);
 }
 
 }  // namespace joulecast::report

@@ -1,9 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <limits>
+#include <nlohmann/json.hpp>
 #include <stack>
 #include <string>
-#include <vector>
 
 #include "report/profile_drawing.h"
 #include "tests/study/exploration/exploration_drawing.h"
@@ -57,38 +56,73 @@ TEST(ExplorationDrawing, NumbersEveryLook) {
   }
 }
 
+using nlohmann::json;
+
+json columns(double energy_j) {
+  return {{"time_s", {0, 1, 2}},
+          {"speed_m_s", {0, 1, 0}},
+          {"yaw_rate_rad_s", {0, 0, 0}},
+          {"power_w", {5, 9, nullptr}},
+          {"energy_j", {0, 7, energy_j}}};
+}
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
+  return n;
+}
+
+TEST(ProfileDrawing, DrawsPlanAndBaselines) {
+  json answer{{"robot_id", "amr"}, {"energy_j", 10.0},  {"distance_m", 1.0},
+              {"turned_rad", 0},   {"duration_s", 2.0}, {"profile", columns(10)}};
+  answer["baselines"]["trapezoid"] = {
+      {"energy_j", 12.5}, {"saving_fraction", 0.2}, {"within_limits", false}, {"profile", columns(12.5)}};
+  answer["baselines"]["triangle"] = {{"energy_j", 13.0}, {"saving_fraction", 0.23}};
+  const auto drawing = draw_answer(answer);
+  ASSERT_TRUE(drawing) << describe(drawing.error());
+  expect_well_formed(*drawing);
+  EXPECT_EQ(count(*drawing, "triangle, as"), 0u);
+  EXPECT_EQ(count(*drawing, "nan"), 0u);
+  for (const char* words : {"amr: 1.00 m", "least energy: 10.0 J", "time, s",
+                            "trapezoid, as long on every run: 12.5 J; the plan saves 20.0 % (breaks"})
+    EXPECT_GT(count(*drawing, words), 0u) << words;
+  answer["baselines"]["triangle"] = nullptr;
+  EXPECT_EQ(draw_answer(answer), drawing);
+}
+
 TEST(ProfileDrawing, DrawsMotionsInEveryPanel) {
-  const auto count = [](const std::string& text, const std::string& part) {
-    std::size_t n = 0;
-    for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;
-    return n;
-  };
-  const double unknown = std::numeric_limits<double>::quiet_NaN();
-  std::vector<DrawnMotion> motions{
-      {"least energy: 10 J", "plan", {0, 1, 2}, {0, 1, 0}, {0, 0, 0}, {5, 9, unknown}, {0, 7, 10}},
-      {"trapezoid: 11 J", "trapezoid", {0, 3}, {0, 0}, {0, 0}, {5, 5}, {0, 11}}};
-  const std::string straight = draw_profile("amr: 1 m", motions);
-  expect_well_formed(straight);
+  json answer{{"profile", columns(10)}};
+  answer["baselines"]["trapezoid"]["profile"] = {{"time_s", {0, 3}},
+                                                 {"speed_m_s", {0, 0}},
+                                                 {"yaw_rate_rad_s", {0, 0}},
+                                                 {"power_w", {5, 5}},
+                                                 {"energy_j", {0, 11}}};
+  const std::string straight = draw_answer(answer).value();
   EXPECT_EQ(count(straight, "<polyline"), 2u * 3u);
-  EXPECT_EQ(count(straight, "nan"), 0u);
-  for (const char* words : {"amr: 1 m", "least energy: 10 J", "trapezoid: 11 J", "speed, m/s",
-                            "power from the battery, W", "energy from the battery, J", "time, s"})
+  for (const char* words : {"speed, m/s", "power from the battery, W", "energy from the battery, J"})
     EXPECT_GT(count(straight, words), 0u) << words;
   EXPECT_EQ(count(straight, "yaw rate"), 0u);
-  motions[0].yaw_rate_rad_s[1] = 0.5;
-  EXPECT_EQ(count(draw_profile("amr", motions), "<polyline"), 2u * 4u);
-  motions[0].speed_m_s[1] = 0;
-  const std::string turn = draw_profile("amr", motions);
+  answer["profile"]["yaw_rate_rad_s"][1] = 0.5;
+  EXPECT_EQ(count(draw_answer(answer).value(), "<polyline"), 2u * 4u);
+  answer["profile"]["speed_m_s"][1] = 0;
+  const std::string turn = draw_answer(answer).value();
   EXPECT_EQ(count(turn, "<polyline"), 2u * 3u);
   EXPECT_EQ(count(turn, "speed, m/s"), 0u);
 }
 
+TEST(ProfileDrawing, RejectsAnswerWithoutColumns) {
+  json answer{{"robot_id", "amr"}, {"energy_j", 10.0}};
+  EXPECT_EQ(draw_answer(answer).error().fault, Fault::corrupt);
+  answer["profile"] = columns(10);
+  answer["profile"]["power_w"] = {1, 2};
+  EXPECT_EQ(draw_answer(answer).error().fault, Fault::corrupt);
+}
+
 TEST(ProfileDrawing, EscapesItsTexts) {
   const std::string text =
-      draw_profile("a < b & \"c\"\x01",
-                   std::vector<DrawnMotion>{{"<script>", "plan", {0, 1}, {0, 1}, {0, 0}, {5, 9}, {0, 7}}});
+      draw_answer({{"robot_id", "<script> a < b & \"c\"\x01"}, {"profile", columns(10)}}).value();
   expect_well_formed(text);
-  EXPECT_NE(text.find("a &lt; b &amp; &quot;c&quot;<"), std::string::npos);
+  EXPECT_NE(text.find("&lt;script&gt; a &lt; b &amp; &quot;c&quot;:"), std::string::npos);
   EXPECT_EQ(text.find("<script>"), std::string::npos);
 }
 
