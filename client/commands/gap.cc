@@ -209,7 +209,11 @@ Result<Json> adopt_diagnosis(const GapOptions& options, const Json& job) {
   TRY_ASSIGN(const auto reply,
              http_request(address, HttpMethod::post, robot_target(options.robot_id, "/models"), wanted.dump(),
                           std::chrono::minutes(1)));
-  if (!reply.ok() && reply.status != 409) return tl::unexpected(error_of(reply));
+  if (!reply.ok() && reply.status != 409) {
+    Error error = error_of(reply);
+    if (error.field == "/effect") error.field = "--effect";
+    return tl::unexpected(std::move(error));
+  }
   return object_of(reply.body, options.server);
 }
 
@@ -219,9 +223,12 @@ void print_adopted_version(const Json& adoption, const std::string& unit) {
     fmt::print("adopted as model version {}\n", adoption["model_version"].get<std::int64_t>());
 }
 
-Result<Exit> carry_out(const GapOptions& options) {
+// Starts a diagnosis of a daemon's own history of a robot, follows the job and prints its result. An
+// interrupt cancels the job.
+Result<Exit> gap_from_server(const GapOptions& options) {
   const Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
-  TRY_ASSIGN(const auto begun, ask(options.server, HttpMethod::post, "/v1/diagnoses", wanted.dump()));
+  TRY_ASSIGN(const auto begun, ask(options.server, HttpMethod::post, "/v1/diagnoses", wanted.dump(),
+                                   {{"/robot_id", "--robot-id"}, {"/max_missions", "--max-missions"}}));
   TRY_ASSIGN(auto first, object_of(begun.body, options.server));
   TRY_ASSIGN(const auto job, follow(options.server, std::move(first)));
   if (!options.report.empty()) {
@@ -248,39 +255,23 @@ Result<Exit> carry_out(const GapOptions& options) {
   return exit;
 }
 
-// Starts a diagnosis of a daemon's own history of a robot, follows the job and prints its result. An
-// interrupt cancels the job.
-Result<Exit> gap_from_server(const GapOptions& options) {
-  return carry_out(options).map_error([](Error error) {
-    for (const auto& [field, flag] :
-         {std::pair{"/robot_id", "--robot-id"}, {"/max_missions", "--max-missions"}, {"/effect", "--effect"}})
-      if (error.field == field) error.field = flag;
-    return error;
-  });
-}
-
 // `joulecast gap --test`: a robot file and the one with the effects found, on missions that were not
 // diagnosed; with enough battery power, also a linear regression on the missions that were.
 struct GapTest {
   energy::BackTest replayed;
   Result<energy::RegressionComparison> beside_regression;
 
-  std::string objection() const;  // to writing the corrected file; empty without
+  // To writing the corrected file; empty without.
+  std::string objection() const {
+    if (!replayed.improves()) return "the back-test shows no improvement";
+    if (!beside_regression || !beside_regression->regression_wins()) return {};
+    const energy::MissedPower& missed = beside_regression->missed;
+    return fmt::format(
+        "power error on the missions of --test: corrected file {:.1f} %, linear regression on the missions "
+        "of the diagnosis {:.1f} %",
+        100 * missed.corrected, 100 * missed.regression);
+  }
 };
-
-double as_percent(double share) {
-  return 100 * share;
-}
-
-std::string GapTest::objection() const {
-  if (!replayed.improves()) return "the back-test shows no improvement";
-  if (!beside_regression || !beside_regression->regression_wins()) return {};
-  const energy::MissedPower& missed = beside_regression->missed;
-  return fmt::format(
-      "power error on the missions of --test: corrected file {:.1f} %, linear regression on the missions of "
-      "the diagnosis {:.1f} %",
-      as_percent(missed.corrected), as_percent(missed.regression));
-}
 
 Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, const std::string& robot_id,
                                        std::span<const telemetry::Recording> diagnosed,

@@ -16,7 +16,7 @@
 namespace joulecast::client {
 
 // The kind of an option's value. The name is printed in the help and selects the completion in a shell
-// (candidates.h): "FILE.json", "ROBOT", "{usual,minimum_energy}".
+// (completion.h): "FILE.json", "ROBOT", "{usual,minimum_energy}".
 struct Value {
   std::string name = {};      // empty: by the type of the member
   std::string bounds = {};    // "0 to 1", for the help; empty: none

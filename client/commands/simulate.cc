@@ -16,6 +16,7 @@
 
 #include "access/robot_keys.h"
 #include "base/host_clock.h"
+#include "base/overloaded.h"
 #include "base/text.h"
 #include "base/text_file.h"
 #include "base/try.h"
@@ -150,17 +151,6 @@ Result<void> introduce(const std::vector<FleetMember>& members, const std::strin
   return {};
 }
 
-using Encoded = Result<std::vector<std::uint8_t>>;
-Encoded encoded(const std::string& robot_id, const signals::MissionEvent& event) {
-  return telemetry::encode_mission_event(robot_id, event);
-}
-Encoded encoded(const std::string& robot_id, const signals::Sample& sample) {
-  return telemetry::encode_telemetry(robot_id, sample);
-}
-Encoded encoded(const std::string& robot_id, const signals::CovariateMessage& covariates) {
-  return telemetry::encode_covariates(robot_id, covariates);
-}
-
 struct Outlets {
   access::RobotKeys keys;
   std::map<std::string, std::int64_t> sequences;  // of each channel, the last
@@ -169,8 +159,13 @@ struct Outlets {
   std::optional<OutputFile> log_file;
 
   Result<void> send(const std::string& robot_id, const vr::Emission& emission) {
-    TRY_ASSIGN(const auto bytes,
-               std::visit([&](const auto& message) { return encoded(robot_id, message); }, emission.message));
+    const Overloaded encode{
+        [&](const signals::MissionEvent& event) { return telemetry::encode_mission_event(robot_id, event); },
+        [&](const signals::Sample& sample) { return telemetry::encode_telemetry(robot_id, sample); },
+        [&](const signals::CovariateMessage& values) {
+          return telemetry::encode_covariates(robot_id, values);
+        }};
+    TRY_ASSIGN(const auto bytes, std::visit(encode, emission.message));
     constexpr telemetry::Subject subjects[] = {telemetry::Subject::mission_event,
                                                telemetry::Subject::telemetry, telemetry::Subject::covariates};
     const std::string channel = telemetry::channel_of(subjects[emission.message.index()], robot_id);

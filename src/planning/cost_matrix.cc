@@ -89,19 +89,8 @@ struct Recorder {
 }  // namespace
 
 std::string_view name_of(Obstacle obstacle) {
-  switch (obstacle) {
-    case Obstacle::none:
-      return "none";
-    case Obstacle::payload:
-      return "payload";
-    case Obstacle::limits:
-      return "limits";
-    case Obstacle::pose:
-      return "pose";
-    case Obstacle::model:
-      return "model";
-  }
-  return "";
+  constexpr std::array<std::string_view, 5> names = {"none", "payload", "limits", "pose", "model"};
+  return names[static_cast<std::size_t>(obstacle)];
 }
 
 Leg leg_of(const Path& path) {

@@ -635,17 +635,8 @@ Limits limits_of(const robot::RobotModel& robot) {
 }
 
 std::string_view name_of(Method method) {
-  switch (method) {
-    case Method::closed_form:
-      return "closed_form";
-    case Method::quadrature:
-      return "quadrature";
-    case Method::interior_point:
-      return "interior_point";
-    case Method::mixed:
-      return "mixed";
-  }
-  return "";
+  constexpr std::array<std::string_view, 4> names = {"closed_form", "quadrature", "interior_point", "mixed"};
+  return names[static_cast<std::size_t>(method)];
 }
 
 std::string_view name_of(Bound bound) {

@@ -310,11 +310,7 @@ export function Legend({ scale, title, unit = 'W' }) {
       <span>{title}</span>
       <span class="number">{digits(scale.low, 2)}</span>
       <span class="colours" style={{ background: `linear-gradient(90deg, ${scale.colours})` }} />
-      <span class="number">
-        {digits(scale.high, 2)}
-        {'\u00a0'}
-        {unit}
-      </span>
+      <span class="number">{`${digits(scale.high, 2)}\u00a0${unit}`}</span>
     </div>
   );
 }

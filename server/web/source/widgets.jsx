@@ -9,12 +9,7 @@ export function Quantity({ of, sign }) {
   return (
     <span class="quantity">
       <span class="number">{n}</span>
-      {of.u && (
-        <span class="unit">
-          {'\u00a0'}
-          {of.u}
-        </span>
-      )}
+      {of.u && <span class="unit">{`\u00a0${of.u}`}</span>}
     </span>
   );
 }
@@ -93,10 +88,7 @@ export function Failure({ error, retry }) {
       <p class="empty-title">
         {[error.title ?? 'Error', error.status !== 401 && error.status].filter(Boolean).join(' · ')}
       </p>
-      <p>
-        {error.message}
-        {where}
-      </p>
+      <p>{error.message + where}</p>
       {(retry || error.status === 401) && (
         <button type="button" onClick={error.status === 401 ? askToSignIn : retry}>
           {error.status === 401 ? 'Sign in' : 'Try again'}

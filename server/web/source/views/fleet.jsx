@@ -207,14 +207,11 @@ function totalsOf(robots) {
 // Energy of today and, until the same time of day, of the same weekday a week ago.
 async function readToday(signal) {
   const midnight = new Date().setHours(0, 0, 0, 0);
-  const sums = ([from, to]) =>
-    get(`/v1/mission-totals${query({ from_utime_us: from * 1000, to_utime_us: to * 1000 })}`, signal);
-  const [today, before] = await Promise.all(
-    [
-      [midnight, Date.now()],
-      [midnight - weekMs, Date.now() - weekMs],
-    ].map(sums),
-  );
+  const sums = (agoMs) => {
+    const times = { from_utime_us: (midnight - agoMs) * 1000, to_utime_us: (Date.now() - agoMs) * 1000 };
+    return get(`/v1/mission-totals${query(times)}`, signal);
+  };
+  const [today, before] = await Promise.all([sums(0), sums(weekMs)]);
   return new Map(Object.entries({ today, before }));
 }
 

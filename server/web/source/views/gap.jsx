@@ -58,6 +58,11 @@ function Progress({ job, onEnd }) {
   );
 }
 
+const Group = ({ name, ids }) => {
+  const options = useOptions(ids);
+  return ids.length > 0 && <optgroup label={name}>{options}</optgroup>;
+};
+
 function Start({ given, onStart }) {
   const live = useLive();
   const robots = useModelled();
@@ -69,8 +74,6 @@ function Start({ given, onStart }) {
   const lately = new Set(newest.value?.missions.map((m) => m.robot_id));
   const driven = robots.filter((id) => lately.has(id));
   const others = robots.filter((id) => !lately.has(id));
-  const ofDriven = useOptions(driven);
-  const ofOthers = useOptions(others);
   const ratios = useRatios(driven);
   const departure = (id) => Math.abs((ratios.get(id) ?? 1) - 1);
   const [likeliest] = [...driven].sort((a, b) => departure(b) - departure(a));
@@ -95,17 +98,8 @@ function Start({ given, onStart }) {
     <form class="wrap filters" onSubmit={start}>
       <Field label="Robot">
         <select value={chosen} onChange={(e) => setRobot(e.currentTarget.value)}>
-          {[
-            [driven, ofDriven, 'Recent missions'],
-            [others, ofOthers, 'Others'],
-          ].map(
-            ([ids, options, name]) =>
-              ids.length > 0 && (
-                <optgroup key={name} label={name}>
-                  {options}
-                </optgroup>
-              ),
-          )}
+          <Group name="Recent missions" ids={driven} />
+          <Group name="Others" ids={others} />
         </select>
       </Field>
       <Field label="Missions, newest">

@@ -177,6 +177,8 @@ function median(values) {
   return sorted.length % 2 === 1 ? sorted[half] : (sorted[half - 1] + sorted[half]) / 2;
 }
 
+const changeOf = (d) => format.signed(share(d.ratio_after - d.ratio_before));
+
 // Measured over modelled energy of each mission with a running median, drifts and new model versions.
 function RatioChart({ history }) {
   const { missions, drift, versions } = history;
@@ -214,15 +216,7 @@ function RatioChart({ history }) {
       const first = missions.find((m) => m.model_version === v.model_version);
       if (first !== undefined) line(first.start_utime_us, p.muted, `v${v.model_version}`, -0.3, []);
     }
-    drift.forEach((d, k) =>
-      line(
-        d.start_utime_us,
-        p.gap,
-        `${format.signed(share(d.ratio_after - d.ratio_before))}`,
-        1 + (k % 3),
-        [4, 3],
-      ),
-    );
+    drift.forEach((d, k) => line(d.start_utime_us, p.gap, changeOf(d), 1 + (k % 3), [4, 3]));
     c.restore();
   };
   const spread = Math.max(0.05, ...data[1].map((v) => Math.min(0.6, Math.abs(v - 1)))) * 1.15;
@@ -246,9 +240,7 @@ function RatioChart({ history }) {
     hooks: { drawAxes: [drawMarks] },
   });
   const last = data[2][data[2].length - 1] ?? median(data[1]);
-  const drifts = drift
-    .map((d) => `${format.time(d.start_utime_us)}: ${format.signed(share(d.ratio_after - d.ratio_before))}`)
-    .join('; ');
+  const drifts = drift.map((d) => `${format.time(d.start_utime_us)}: ${changeOf(d)}`).join('; ');
   return (
     <>
       <Chart
