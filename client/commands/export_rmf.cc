@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -114,7 +115,7 @@ Result<RmfFit> fit_of(const RmfOptions& options, const std::optional<RmfParamete
   }
   TRY_ASSIGN(RmfFit fit, fit_rmf(missions, model["battery"]["capacity_ah"].get<double>(), before));
   TRY_ASSIGN(const std::optional<double> charging, charging_current_of(options));
-  if (charging) fit.parameters.charging_current = charging;
+  if (charging) fit.parameters.charging_current = *charging;
   return fit;
 }
 
@@ -146,16 +147,14 @@ Json rmf_json(const RmfOptions& options, const RmfFit& fit) {
                 {"error_before", fit.error_before ? rmf_json(*fit.error_before) : Json()},
                 {"error_with_turns", rmf_json(fit.error_with_turns)},
                 {"turn_j_per_rad", fit.turn_j_per_rad}};
-  for (const RmfPlace& place : rmf_places()) {
-    const std::optional<double> value = place.get(fit.parameters);
-    document[place.section][place.key] = value ? Json(*value) : Json();
-  }
+  for (const RmfPlace& place : rmf_places())
+    document[place.section][place.key] = json_number(fit.parameters.*place.value);
   return document;
 }
 
 std::string configuration_of(const RmfOptions& options, std::string yaml, const RmfFit& fit) {
   std::string text = summary_of(options, fit) + with_rmf_parameters(yaml, fit.parameters);
-  if (!options.config.empty() || fit.parameters.charging_current) return text;
+  if (!options.config.empty() || !std::isnan(fit.parameters.charging_current)) return text;
   constexpr std::string_view unknown = "charging_current: 0 # A";
   return text.replace(text.find(unknown), unknown.size(),
                       "# charging_current: in A; no whole charge was observed");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/algorithm/string/replace.hpp>
 #include <cstdio>
 
 #include "base/text.h"
@@ -105,10 +106,7 @@ CLI::App& alternatives(CLI::App& command) {
 }
 
 void add_examples(CLI::App& command, const char* examples) {
-  std::string footer = "Examples:\n  ";
-  for (const char* c = examples; *c != '\0'; ++c)
-    footer += *c == '\n' ? std::string("\n  ") : std::string(1, *c);
-  command.footer(footer + "\n\n");
+  command.footer("Examples:\n  " + boost::replace_all_copy<std::string>(examples, "\n", "\n  ") + "\n\n");
 }
 
 CLI::App& add_group(CLI::App& parent, const char* name, const char* help) {

@@ -95,12 +95,6 @@ RmfError error_by(std::span<const std::vector<RmfDrive>> missions,
   return error;
 }
 
-template <class Member>
-RmfPlace rmf_place(const char* section, const char* key, const char* unit, Member member) {
-  return {section, key, unit, [member](const RmfParameters& p) { return std::optional<double>(p.*member); },
-          [member](RmfParameters& p, double value) { p.*member = value; }};
-}
-
 // "  mass: 55.0  # kg": the key, and the place of the value in the line; without a value for
 // "mechanical_system:".
 struct YamlLine {
@@ -154,14 +148,14 @@ RmfError rmf_error(const RmfParameters& parameters, std::span<const std::vector<
 const std::vector<RmfPlace>& rmf_places() {
   using P = RmfParameters;
   static const std::vector<RmfPlace> table{
-      rmf_place("battery_system", "voltage", "V", &P::voltage),
-      rmf_place("battery_system", "capacity", "Ah", &P::capacity),
-      rmf_place("battery_system", "charging_current", "A", &P::charging_current),
-      rmf_place("mechanical_system", "mass", "kg", &P::mass),
-      rmf_place("mechanical_system", "moment_of_inertia", "kg m^2", &P::moment_of_inertia),
-      rmf_place("mechanical_system", "friction_coefficient", "", &P::friction_coefficient),
-      rmf_place("ambient_system", "power", "W", &P::ambient_power),
-      rmf_place("tool_system", "power", "W", &P::tool_power)};
+      {"battery_system", "voltage", "V", &P::voltage},
+      {"battery_system", "capacity", "Ah", &P::capacity},
+      {"battery_system", "charging_current", "A", &P::charging_current},
+      {"mechanical_system", "mass", "kg", &P::mass},
+      {"mechanical_system", "moment_of_inertia", "kg m^2", &P::moment_of_inertia},
+      {"mechanical_system", "friction_coefficient", "", &P::friction_coefficient},
+      {"ambient_system", "power", "W", &P::ambient_power},
+      {"tool_system", "power", "W", &P::tool_power}};
   return table;
 }
 
@@ -242,7 +236,7 @@ Result<RmfParameters> read_rmf_configuration(const std::string& yaml) {
   std::string wrong;
   with_values(yaml, [&](const RmfPlace& place, const std::string& text) {
     char* end = nullptr;
-    place.set(parameters, std::strtod(text.c_str(), &end));
+    parameters.*place.value = std::strtod(text.c_str(), &end);
     if (*end != '\0') wrong = text;
     std::erase(missing, &place);
     return text;
@@ -257,8 +251,8 @@ Result<RmfParameters> read_rmf_configuration(const std::string& yaml) {
 
 std::string with_rmf_parameters(const std::string& yaml, const RmfParameters& parameters) {
   return with_values(yaml, [&](const RmfPlace& place, const std::string& text) {
-    const std::optional<double> value = place.get(parameters);
-    return value ? fmt::format("{:.4g}", *value) : text;
+    const double value = parameters.*place.value;
+    return std::isnan(value) ? text : fmt::format("{:.4g}", value);
   });
 }
 

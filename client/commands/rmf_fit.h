@@ -1,7 +1,7 @@
 #pragma once
 
 #include <array>
-#include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,11 +16,11 @@ namespace joulecast::client {
 
 // The values of a fleet configuration that price a drive, in the units of the configuration.
 struct RmfParameters {
-  double voltage = 0;                           // V
-  double capacity = 0;                          // Ah
-  std::optional<double> charging_current = {};  // A
-  double mass = 0;                              // kg
-  double moment_of_inertia = 0;                 // kg m²
+  double voltage = 0;                                                  // V
+  double capacity = 0;                                                 // Ah
+  double charging_current = std::numeric_limits<double>::quiet_NaN();  // A; NaN: unknown
+  double mass = 0;                                                     // kg
+  double moment_of_inertia = 0;                                        // kg m²
   double friction_coefficient = 0;
   double ambient_power = 0;  // W
   double tool_power = 0;     // W
@@ -59,8 +59,7 @@ struct RmfPlace {
   const char* section;
   const char* key;
   const char* unit;
-  std::function<std::optional<double>(const RmfParameters&)> get;
-  std::function<void(RmfParameters&, double)> set;
+  double RmfParameters::*value;
 };
 // In the order of the configurations of RMF's demonstrations.
 [[nodiscard]] const std::vector<RmfPlace>& rmf_places();
