@@ -1,9 +1,5 @@
 #include "access/robot_keys.h"
 
-#include <sys/stat.h>
-
-#include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -11,7 +7,6 @@
 #include "access/secret_file.h"
 #include "access/sha256.h"
 #include "base/json_fields.h"
-#include "base/text_file.h"
 #include "base/try.h"
 
 namespace joulecast::access {
@@ -46,11 +41,7 @@ std::string to_json_text(const RobotKeys& keys) {
 }
 
 Result<RobotKeys> read_robot_keys(const std::string& path) {
-  struct stat status {};
-  if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
-  if ((status.st_mode & S_IROTH) != 0)
-    return invalid(path, "may be read by every user of this machine: chmod o-r");
-  TRY_ASSIGN(const std::string text, read_text_file(path));
+  TRY_ASSIGN(const std::string text, read_private_file(path));
   Result<RobotKeys> keys = parse_robot_keys(text);
   if (!keys) return invalid(path, describe(keys.error()));
   return keys;

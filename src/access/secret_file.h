@@ -7,13 +7,15 @@
 #include <string_view>
 
 #include "base/error.h"
+#include "base/text_file.h"
 #include "base/try.h"
 
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
 
-// The content of a file, without the whitespace around it. Fault::invalid where every user of the machine may
-// read the file or it holds fewer than `least` bytes.
+// The content of a file. Fault::invalid where every user of the machine may read it.
+Result<std::string> read_private_file(const std::string& path, std::size_t max_bytes = max_text_file_bytes);
+// The same without the whitespace around it; Fault::invalid also where that are fewer than `least` bytes.
 Result<std::string> read_secret(const std::string& path, std::size_t least);
 
 // The new file next to the old one, as `<path>.new`, which exists only while it is written.
