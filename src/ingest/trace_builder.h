@@ -1,10 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "energy/meter.h"
-#include "history/records.h"
+#include "history/trace_merge.h"
 
 namespace joulecast::ingest {
 
@@ -18,26 +19,9 @@ class TraceBuilder {
   std::vector<history::TraceBucket> take();
 
  private:
-  // A running band: sums become the mean when the bucket is handed out.
-  struct Sum {
-    double weighted = 0, weight = 0;
-    double min = signals::unmeasured, max = signals::unmeasured;
-    void add(double value, double weight_s);
-    history::Band band() const;
-  };
-  struct Open {
-    std::int64_t start_utime_us = 0;
-    double covered_s = 0;
-    Sum measured, modelled, speed, x, y;
-    history::TraceBucket bucket() const;
-    double state_of_charge = signals::unmeasured, measured_j = signals::unmeasured,
-           modelled_j = signals::unmeasured;
-  };
-
   std::vector<history::TraceBucket> finished_;
-  Open open_;
-  bool any_ = false;
-  bool touched_ = false;
+  std::optional<history::BucketSum> open_;
+  bool touched_ = false;  // since the last take()
 };
 
 }  // namespace joulecast::ingest
