@@ -50,12 +50,7 @@ bool FloorMapper::add(const history::FloorMission& mission) {
     Square& square = squares_[{v.column, v.row}];
     FloorCell& cell = square.cell;
     ++cell.missions;
-    cell.covered_s += v.covered_s;
-    cell.distance_m += v.distance_m;
-    cell.energy_j += v.energy_j;
-    cell.driving_j += v.driving_j;
-    cell.measured_j += v.measured_j;
-    cell.modelled_j += v.modelled_j;
+    cell += v;
     square.robots.insert(robot);
     if (usual > 0 && v.modelled_j != 0)
       square.departure.add(v.measured_j - usual * v.modelled_j, usual * v.modelled_j);
@@ -137,11 +132,7 @@ Result<FloorMap> FloorMapper::finish(const history::FloorReading& reading) const
     cell.x_m = place.first * cell_m_;
     cell.y_m = place.second * cell_m_;
     cell.robots = static_cast<std::int64_t>(square.robots.size());
-    map.covered_s += cell.covered_s;
-    map.distance_m += cell.distance_m;
-    map.energy_j += cell.energy_j;
-    map.measured_j += cell.measured_j;
-    map.modelled_j += cell.modelled_j;
+    map += cell;
     departures.emplace_back(place, &square.departure);
     cells.emplace_hint(cells.end(), place, cell);
   }

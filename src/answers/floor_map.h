@@ -28,14 +28,10 @@ inline constexpr std::int64_t least_floor_missions = 5;  // for a departure
 inline constexpr double least_floor_departure = 0.05;    // that may be marked
 inline constexpr std::size_t most_floor_cells = 200'000;
 
-struct FloorCell {
+struct FloorCell : history::FloorSums {
   double x_m = 0, y_m = 0;  // the corner of least coordinates
   std::int64_t missions = 0;
   std::int64_t robots = 0;
-  double covered_s = 0;
-  double distance_m = 0;
-  double energy_j = 0, driving_j = 0;
-  double measured_j = 0, modelled_j = 0;  // over the seconds of driving in which both are available
   // Excess over the expected energy, as a share of it, with its 95 % interval; NaN: too few missions.
   double departure = signals::unmeasured;
   std::array<double, 2> interval{signals::unmeasured, signals::unmeasured};
@@ -56,11 +52,10 @@ struct FloorZone {
   double excess_j = 0;  // over the expected energy
 };
 
-struct FloorMap {
+struct FloorMap : history::FloorSums {
   double cell_m = 0;
   history::FloorReading reading;
   std::vector<std::string> robots;
-  double covered_s = 0, distance_m = 0, energy_j = 0, measured_j = 0, modelled_j = 0;
   std::vector<FloorCell> cells;  // the longest visited first
   std::vector<FloorZone> zones;  // the greatest excess first, of either sign
 };
@@ -89,13 +84,12 @@ class FloorMapper {
     Departure departure;
   };
   using Place = std::pair<std::int32_t, std::int32_t>;
-  using Squares = std::map<Place, Square>;
 
   static void judge(std::vector<std::pair<Place, const Departure*>>& of, std::map<Place, FloorCell>& cells);
   std::vector<FloorZone> zones(const std::map<Place, FloorCell>& cells) const;
 
   double cell_m_;
-  Squares squares_;
+  std::map<Place, Square> squares_;
   std::map<std::string, std::size_t, std::less<>> robots_;
 };
 

@@ -41,8 +41,8 @@ struct FloorChoice {
   std::vector<Chosen> chosen;  // by key: all of them, or an even share that has at most so many points
 };
 
-struct FloorSums {
-  std::vector<std::vector<FloorVisit>> visits;  // of each mission
+struct Visits {
+  std::vector<std::vector<FloorVisit>> of;  // of each mission
   std::int64_t points = 0;
 };
 
@@ -80,7 +80,7 @@ class Sums {
     const std::uint64_t place =
         std::uint64_t{static_cast<std::uint32_t>(column)} << 32 | static_cast<std::uint32_t>(row);
     const auto [found, is_new] = places_.try_emplace(place, visits_.size());
-    if (is_new) visits_.push_back({.column = column, .row = row});
+    if (is_new) visits_.push_back({{}, column, row});
     return visits_[found->second];
   }
 
@@ -144,10 +144,10 @@ std::size_t next_at_once(std::span<const FloorChoice::Chosen> chosen) {
   return count;
 }
 
-Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m) {
-  FloorSums sums;
-  sums.visits.resize(chosen.size());
-  if (chosen.empty()) return sums;
+Result<Visits> floor_visits(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m) {
+  Visits visits;
+  visits.of.resize(chosen.size());
+  if (chosen.empty()) return visits;
   Rows rows(database, select_points());
   for (std::size_t k = 0; k < missions_at_once; ++k) rows.bind(chosen[std::min(k, chosen.size() - 1)].key);
   Sums mission(cell_m);
@@ -155,17 +155,27 @@ Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Ch
   while (rows.next()) {
     const MissionKey key = rows.integer();
     if (chosen[at].key != key) {
-      sums.visits[at] = mission.take();
+      visits.of[at] = mission.take();
       while (chosen[at].key != key) ++at;
     }
     mission.add(rows);
-    ++sums.points;
+    ++visits.points;
   }
-  sums.visits[at] = mission.take();
-  return sums;
+  visits.of[at] = mission.take();
+  return visits;
 }
 
 }  // namespace
+
+FloorSums& FloorSums::operator+=(const FloorSums& more) {
+  covered_s += more.covered_s;
+  distance_m += more.distance_m;
+  energy_j += more.energy_j;
+  measured_j += more.measured_j;
+  modelled_j += more.modelled_j;
+  driving_j += more.driving_j;
+  return *this;
+}
 
 Result<FloorReading> Store::floor_visits(const MissionFilter& filter, double cell_m, std::int64_t max_points,
                                          const FloorSink& sink) const {
@@ -177,10 +187,11 @@ Result<FloorReading> Store::floor_visits(const MissionFilter& filter, double cel
   // Each part separately, so that a part read again after a lost connection reaches the sink once.
   for (std::span rest(choice.chosen); !rest.empty();) {
     const auto part = rest.first(next_at_once(rest));
-    TRY_ASSIGN(const auto sums, read([&](Database& database) { return floor_sums(database, part, cell_m); }));
-    reading.points += sums.points;
+    TRY_ASSIGN(const auto visits,
+               read([&](Database& database) { return history::floor_visits(database, part, cell_m); }));
+    reading.points += visits.points;
     for (std::size_t k = 0; k < part.size(); ++k, ++reading.missions_read)
-      if (!sink({part[k].key, part[k].robot_id, sums.visits[k]})) return reading;
+      if (!sink({part[k].key, part[k].robot_id, visits.of[k]})) return reading;
     rest = rest.subspan(part.size());
   }
   return reading;

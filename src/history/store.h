@@ -138,10 +138,8 @@ inline constexpr double farthest_floor_m = 1e6;
 // With 0.02 and 0.1 m/s the energy over distance of a virtual AMR is 2 % more and 4 % less.
 inline constexpr double least_floor_speed_m_s = 0.05;
 
-// A mission's sums within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
-// origin of its robot's map, from the mission's trace: a second belongs to the square of its mean position.
-struct FloorVisit {
-  std::int32_t column = 0, row = 0;
+// Sums over seconds of missions.
+struct FloorSums {
   double covered_s = 0;
   double distance_m = 0;  // sum of the absolute mean speeds of the seconds
   double energy_j = 0;    // measured, or modelled where it was not
@@ -149,6 +147,14 @@ struct FloorVisit {
   double measured_j = 0;
   double modelled_j = 0;
   double driving_j = 0;  // of energy_j
+
+  FloorSums& operator+=(const FloorSums& more);
+};
+
+// A mission's sums within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
+// origin of its robot's map, from the mission's trace: a second belongs to the square of its mean position.
+struct FloorVisit : FloorSums {
+  std::int32_t column = 0, row = 0;
 };
 
 struct FloorMission {

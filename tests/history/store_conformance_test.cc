@@ -913,7 +913,7 @@ TEST_P(StoreConformance, ReplacesBucketsAndReadsRanges) {
 
 // Sums of each square in a reading, by its column and row.
 struct Floor {
-  std::map<std::pair<int, int>, FloorVisit> squares;
+  std::map<std::pair<int, int>, FloorSums> squares;
   std::vector<MissionKey> missions;
   FloorReading reading;
 };
@@ -924,13 +924,7 @@ Floor floor_of(const Store& store, const MissionFilter& filter, double cell_m,
   floor.reading = need(store.floor_visits(filter, cell_m, max_points, [&](const FloorMission& mission) {
     floor.missions.push_back(mission.key);
     for (const FloorVisit& v : mission.visits) {
-      FloorVisit& sum = floor.squares[{v.column, v.row}];
-      sum.covered_s += v.covered_s;
-      sum.distance_m += v.distance_m;
-      sum.energy_j += v.energy_j;
-      sum.driving_j += v.driving_j;
-      sum.measured_j += v.measured_j;
-      sum.modelled_j += v.modelled_j;
+      floor.squares[{v.column, v.row}] += v;
     }
     return true;
   }));
@@ -975,7 +969,7 @@ TEST_P(StoreConformance, SumsTracesByFloorSquare) {
   EXPECT_EQ(seconds(-1), 3);
   EXPECT_EQ(seconds(0), 3);
   EXPECT_EQ(seconds(1), 1);
-  const FloorVisit& square = floor.squares.at({0, -1});
+  const FloorSums& square = floor.squares.at({0, -1});
   EXPECT_EQ(square.distance_m, 3);
   EXPECT_EQ(square.energy_j, 150);
   EXPECT_EQ(square.driving_j, 150);
@@ -993,7 +987,7 @@ TEST_P(StoreConformance, SumsTracesByFloorSquare) {
 TEST_P(StoreConformance, FloorEnergyIsOfDriving) {
   drive_along(*store_, "amr-1", "a", 100, 0.5, 7, true);
   const Floor floor = floor_of(*store_, {}, 2);
-  const FloorVisit& square = floor.squares.at({0, -1});
+  const FloorSums& square = floor.squares.at({0, -1});
   EXPECT_EQ(square.covered_s, 7);
   EXPECT_EQ(square.distance_m, 0);
   EXPECT_EQ(square.energy_j, 350);
