@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "ingest/by_robot.h"
 #include "ingest/charge_watch.h"
 #include "ingest/contradiction.h"
 #include "signals/ledger.h"
@@ -51,18 +51,13 @@ struct RobotSnapshot {
   std::map<std::string, std::uint64_t> missions_left_out;
 };
 
-// The latest snapshot of every robot. Any thread publishes and reads; the lock is held only to copy one
-// pointer, or one per robot.
-class FleetView {
+// The latest snapshot of every robot.
+class FleetView : public ByRobot<RobotSnapshot> {
  public:
-  void publish(std::shared_ptr<const RobotSnapshot> snapshot);
-  void remove(std::string_view robot_id);
-  std::shared_ptr<const RobotSnapshot> find(std::string_view robot_id) const;
-  std::vector<std::shared_ptr<const RobotSnapshot>> all() const;
-
- private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<const RobotSnapshot>, std::less<>> latest_;
+  void publish(Pointer snapshot) {
+    const std::string& robot_id = snapshot->robot_id;
+    put(robot_id, std::move(snapshot));
+  }
 };
 
 // A robot's snapshot as the daemons of a cluster hand it on.
