@@ -82,22 +82,14 @@ Result<std::vector<drift::MissionRatio>> DriftView::recent(const ingest::ModelIn
   });
 }
 
-std::vector<std::string> DriftView::robots_of_kind(const std::string& robot_id) const {
-  std::vector<std::string> ids;
-  const auto model = models_.find(robot_id);
-  if (model == nullptr) return ids;
-  for (const auto& other : models_.all())
-    if (robot::kind_of(other->robot) == robot::kind_of(model->robot)) ids.push_back(other->robot.robot_id);
-  return ids;
-}
-
 Result<std::vector<drift::SiblingRatio>> DriftView::siblings(const std::string& robot_id) const {
   std::vector<drift::RobotRatios> kind;
-  for (const std::string& id : robots_of_kind(robot_id)) {
-    const auto model = models_.find(id);
-    if (model == nullptr) continue;
-    TRY_ASSIGN(auto newest, recent(*model));
-    kind.push_back({id, std::move(newest)});
+  const auto model = models_.find(robot_id);
+  if (model == nullptr) return compare(kind);
+  for (const auto& other : models_.all()) {
+    if (robot::kind_of(other->robot) != robot::kind_of(model->robot)) continue;
+    TRY_ASSIGN(auto newest, recent(*other));
+    kind.push_back({other->robot.robot_id, std::move(newest)});
   }
   return compare(kind);
 }

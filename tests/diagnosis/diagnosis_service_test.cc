@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "robot/kind.h"
 #include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/model_adoption.h"
 #include "tests/diagnosis/history_of.h"
@@ -277,7 +278,9 @@ TEST_F(GapWatchTest, ReportsDeviatingSibling) {
   const auto told = events("gap_sibling");
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].robot_id, "c");
-  EXPECT_EQ(drift_.robots_of_kind("a").size(), 5U);  // and the nomad itself
+  EXPECT_EQ(harness_.models.size(), 5U);  // and the nomad itself
+  for (const auto& model : harness_.models.all())
+    EXPECT_EQ(robot::kind_of(model->robot), robot::kind_of(testing::nomad()));
   watch_->look();
   EXPECT_EQ(events("gap_sibling").size(), 1U);
   EXPECT_EQ(watch_->counts().standing_out, 1U);
