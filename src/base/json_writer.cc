@@ -59,28 +59,15 @@ void JsonWriter::separate() {
   comma_ = true;
 }
 
-JsonWriter& JsonWriter::begin_object() {
+JsonWriter& JsonWriter::begin(char bracket) {
   separate();
-  text_ += '{';
+  text_ += bracket;
   comma_ = false;
   return *this;
 }
 
-JsonWriter& JsonWriter::end_object() {
-  text_ += '}';
-  comma_ = true;
-  return *this;
-}
-
-JsonWriter& JsonWriter::begin_array() {
-  separate();
-  text_ += '[';
-  comma_ = false;
-  return *this;
-}
-
-JsonWriter& JsonWriter::end_array() {
-  text_ += ']';
+JsonWriter& JsonWriter::end(char bracket) {
+  text_ += bracket;
   comma_ = true;
   return *this;
 }
@@ -96,10 +83,6 @@ JsonWriter& JsonWriter::time(std::string_view name, std::optional<std::int64_t> 
   key(name.empty() ? "time" : name);
   utime_us ? value(utc_text(*utime_us)) : null();
   return field(name.empty() ? "utime_us" : std::string(name) + "_utime_us", utime_us);
-}
-
-JsonWriter& JsonWriter::value(double number) {
-  return exact(resolved(number));
 }
 
 JsonWriter& JsonWriter::exact(double number) {
@@ -120,18 +103,6 @@ JsonWriter& JsonWriter::value(std::int64_t number) {
 JsonWriter& JsonWriter::value(std::uint64_t number) {
   separate();
   append_number(text_, number);
-  return *this;
-}
-
-JsonWriter& JsonWriter::value(bool truth) {
-  separate();
-  text_ += truth ? "true" : "false";
-  return *this;
-}
-
-JsonWriter& JsonWriter::null() {
-  separate();
-  text_ += "null";
   return *this;
 }
 

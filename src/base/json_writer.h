@@ -25,25 +25,26 @@ class JsonWriter {
   enum class Whole { without_point, with_point };
   explicit JsonWriter(Whole whole = Whole::without_point) : whole_(whole) {}
 
-  JsonWriter& begin_object();
-  JsonWriter& end_object();
-  JsonWriter& begin_array();
-  JsonWriter& end_array();
+  JsonWriter& begin_object() { return begin('{'); }
+  JsonWriter& end_object() { return end('}'); }
+  JsonWriter& begin_array() { return begin('['); }
+  JsonWriter& end_array() { return end(']'); }
   JsonWriter& key(std::string_view name);
 
-  JsonWriter& value(double number);  // resolved(), in the shortest text that reads back
+  // resolved(), in the shortest text that reads back
+  JsonWriter& value(double number) { return exact(resolved(number)); }
   JsonWriter& exact(double number);  // as it is, for evidence: the text reads back as the same double
   JsonWriter& value(std::int64_t number);
   JsonWriter& value(std::uint64_t number);
   JsonWriter& value(int number) { return value(static_cast<std::int64_t>(number)); }
-  JsonWriter& value(bool truth);
+  JsonWriter& value(bool truth) { return raw(truth ? "true" : "false"); }
   JsonWriter& value(std::string_view text);
   JsonWriter& value(const char* text) { return value(std::string_view(text)); }
   JsonWriter& value(const std::string& text) { return value(std::string_view(text)); }
   JsonWriter& value(const std::variant<double, std::string>& either) {
     return std::visit([this](const auto& one) -> JsonWriter& { return value(one); }, either);
   }
-  JsonWriter& null();
+  JsonWriter& null() { return raw("null"); }
   // JSON text made elsewhere.
   JsonWriter& raw(std::string_view text);
   // JSON text written for people: without the space between its parts.
@@ -79,6 +80,8 @@ class JsonWriter {
 
  private:
   void separate();
+  JsonWriter& begin(char bracket);
+  JsonWriter& end(char bracket);
 
   std::string text_;
   Whole whole_;
