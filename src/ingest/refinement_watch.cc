@@ -12,6 +12,10 @@
 #include "robot/robot_file.h"
 
 namespace joulecast::ingest {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RefinementProgress, judged, payload_sums, changed_utime_us, tests,
+                                   tested_at, learned_from)
+
 namespace {
 
 using Json = nlohmann::json;
@@ -57,7 +61,7 @@ void RefinementWatch::use(const robot::RobotModel& robot, std::int64_t version) 
     refinement_.rebase(robot);
   } else {
     refinement_ = energy::Refinement(robot);
-    learned_from_.clear();
+    progress_.learned_from.clear();
   }
   begin_tests();
   robot_ = robot;
@@ -65,28 +69,24 @@ void RefinementWatch::use(const robot::RobotModel& robot, std::int64_t version) 
   equations_ = equations_of(robot);
 }
 
-void RefinementWatch::begin_mission() {
-  equations_.take();
-}
-
 RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& mission) {
   Judgement out;
   const std::vector<energy::DriveEquation> equations = equations_.take();
   const double declared_kg = equations_.mean_payload_kg();
-  const bool learn = judged_ % held_out_every != held_out_every - 1;
+  const bool learn = progress_.judged % held_out_every != held_out_every - 1;
   const energy::MissionFinding finding =
       refinement_.judge(equations, declared_kg, mission.start_utime_us, learn);
   if (!finding.enough) return out;
-  ++judged_;
-  if (learn) learned_from_.push_back(mission.key);
-  while (learned_from_.size() > refinement_.missions()) learned_from_.pop_front();
+  ++progress_.judged;
+  if (learn) progress_.learned_from.push_back(mission.key);
+  while (progress_.learned_from.size() > refinement_.missions()) progress_.learned_from.pop_front();
   if (!finding.inseparable && finding.undeclared_kg.sd > 0) {
     const double weight = 1 / (finding.undeclared_kg.sd * finding.undeclared_kg.sd);
     const double carried_kg = declared_kg + finding.undeclared_kg.value;
     const std::array<double, 5> terms{1, declared_kg, carried_kg, declared_kg * declared_kg,
                                       declared_kg * carried_kg};
     for (std::size_t k = 0; k < terms.size(); ++k)
-      payload_sums_[k] = payload_memory * payload_sums_[k] + weight * terms[k];
+      progress_.payload_sums[k] = payload_memory * progress_.payload_sums[k] + weight * terms[k];
   }
   const PayloadLine line = payload_line();
   // Less than nothing is an error of the file.
@@ -120,7 +120,7 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
 }
 
 RefinementWatch::PayloadLine RefinementWatch::payload_line() const {
-  const auto [w, x, y, xx, xy] = payload_sums_;
+  const auto [w, x, y, xx, xy] = progress_.payload_sums;
   const double spread = xx - x * x / w;
   // Of one declared payload: the unloaded robot carries this at most.
   if (!(spread > 1e-9 * xx)) return {0, std::numeric_limits<double>::infinity(), y / w, 1 / std::sqrt(w)};
@@ -136,43 +136,39 @@ std::optional<Contradiction> RefinementWatch::payload_unit(const PayloadLine& li
       std::abs(slope - pound_kg) > payload_certain * sd ||
       std::abs(unloaded_kg) > least_significance * unloaded_sd_kg)
     return std::nullopt;
-  Contradiction c;
-  c.kind = ContradictionKind::scale;
-  c.id = "payload_scale";
-  c.channel = "payload_mass";
-  c.value = slope;
-  c.says = fmt::format(
-      "payload_mass looks given in lb: by the motors, the robot carries {:.2f} ({:.2f} to {:.2f}) "
-      "times what its missions declare; joulecast expects kg.",
-      slope, slope - 1.96 * sd, slope + 1.96 * sd);
-  return c;
+  return Contradiction{
+      ContradictionKind::scale, "payload_scale", "payload_mass", slope,
+      fmt::format(
+          "payload_mass looks given in lb: by the motors, the robot carries {:.2f} ({:.2f} to {:.2f}) "
+          "times what its missions declare; joulecast expects kg.",
+          slope, slope - 1.96 * sd, slope + 1.96 * sd)};
 }
 
 void RefinementWatch::set_change(const std::optional<drift::Mark>& change) {
-  if (!change || change->utime_us <= changed_utime_us_) return;
-  changed_utime_us_ = change->utime_us;
+  if (!change || change->utime_us <= progress_.changed_utime_us) return;
+  progress_.changed_utime_us = change->utime_us;
   refinement_.restart(change->utime_us, change->quantity == drift::Quantity::mass);
-  while (learned_from_.size() > refinement_.missions()) learned_from_.pop_front();
+  while (progress_.learned_from.size() > refinement_.missions()) progress_.learned_from.pop_front();
   begin_tests();
 }
 
 // One that failed its back-test is tried again with a quarter more missions.
 std::optional<history::Proposal> RefinementWatch::suggestion() {
   const std::size_t missions = refinement_.missions();
-  if (missions < fewest_missions || missions <= tested_at_ + tested_at_ / 4 ||
+  if (missions < fewest_missions || missions <= progress_.tested_at + progress_.tested_at / 4 ||
       !(refinement_.significance() > least_significance))
     return std::nullopt;
-  ++tests_;
-  tested_at_ = missions;
+  ++progress_.tests;
+  progress_.tested_at = missions;
   const robot::RobotModel refined = refinement_.refined(least_departure);
   history::Proposal p;
   p.robot_id = robot_.robot_id;
   p.kind = "calibration";
   p.base_version = version_;
-  p.fitted_on = {learned_from_.begin(), learned_from_.end()};
+  p.fitted_on = {progress_.learned_from.begin(), progress_.learned_from.end()};
   p.model_json = robot::to_json_text(refined);
   Json detail{{"missions", refinement_.missions()},
-              {"tests", tests_},
+              {"tests", progress_.tests},
               {"fitted_until_utime_us", refinement_.memory().learned.back().utime_us},
               {"significance_sd", refinement_.significance()},
               {"scatter_factor", refinement_.scatter_factor()},
@@ -199,15 +195,10 @@ std::string RefinementWatch::memory_json() const {
   Json learned = Json::array();
   for (const energy::MissionParameters& m : memory.learned)
     learned.push_back({m.utime_us, m.declared_kg, m.value, m.covariance});
-  return Json{{"learned", std::move(learned)},
-              {"mass_changed", memory.mass_changed},
-              {"changed_utime_us", changed_utime_us_},
-              {"judged", judged_},
-              {"payload_sums", payload_sums_},
-              {"tests", tests_},
-              {"tested_at", tested_at_},
-              {"learned_from", learned_from_}}
-      .dump();
+  Json document = progress_;
+  document["learned"] = std::move(learned);
+  document["mass_changed"] = memory.mass_changed;
+  return document.dump();
 }
 
 void RefinementWatch::recall(const std::string& text) {
@@ -218,19 +209,9 @@ void RefinementWatch::recall(const std::string& text) {
     for (const Json& m : document.at("learned"))
       memory.learned.push_back({m.at(0), m.at(1), m.at(2), m.at(3)});
     memory.mass_changed = document.at("mass_changed").get<bool>();
-    auto learned_from = document.at("learned_from").get<std::deque<history::MissionKey>>();
-    const auto changed = document.at("changed_utime_us").get<std::int64_t>(),
-               judged = document.at("judged").get<std::int64_t>();
-    const auto tests = document.at("tests").get<std::size_t>(),
-               tested_at = document.at("tested_at").get<std::size_t>();
-    const auto sums = document.at("payload_sums").get<decltype(payload_sums_)>();
-    if (learned_from.size() != memory.learned.size() || !refinement_.recall(std::move(memory))) return;
-    learned_from_ = std::move(learned_from);
-    changed_utime_us_ = changed;
-    judged_ = judged;
-    tests_ = tests;
-    tested_at_ = tested_at;
-    payload_sums_ = sums;
+    auto progress = document.get<RefinementProgress>();
+    if (progress.learned_from.size() == memory.learned.size() && refinement_.recall(std::move(memory)))
+      progress_ = std::move(progress);
   } catch (const Json::exception&) {
     // Written by another version: training begins again.
   }

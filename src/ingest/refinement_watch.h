@@ -16,6 +16,18 @@
 
 namespace joulecast::ingest {
 
+// The state of a refinement that survives restarts, with the refinement's own memory.
+struct RefinementProgress {
+  std::int64_t judged = 0;  // missions
+  // Of the carried payload over the declared one, over missions, weighted: 1, x, y, x x, x y; the newest ten
+  // count most.
+  std::array<double, 5> payload_sums{};
+  std::int64_t changed_utime_us = 0;             // of the change from which on it is refined
+  std::size_t tests = 0;                         // of candidates for this version since then
+  std::size_t tested_at = 0;                     // missions used for training at the last one
+  std::deque<history::MissionKey> learned_from;  // of the refinement's missions
+};
+
 // Refines one robot's friction, idle power, mass and battery resistance from its missions as they come,
 // reports payloads that were not declared, and suggests a new model version when the refined one departs from
 // that in force.
@@ -29,7 +41,7 @@ class RefinementWatch {
   // Another version of the robot's model came in force; between missions.
   void use(const robot::RobotModel& robot, std::int64_t version);
 
-  void begin_mission();
+  void begin_mission() { equations_.take(); }
   // Samples of the mission in order of time, without those at a charger, and the climb there.
   void add(const signals::Sample& sample, double climb_rad) { equations_.add(sample, climb_rad); }
   void interrupt() { equations_.interrupt(); }
@@ -58,20 +70,13 @@ class RefinementWatch {
   };
   PayloadLine payload_line() const;
   static std::optional<Contradiction> payload_unit(const PayloadLine& line);
-  void begin_tests() { tests_ = 0, tested_at_ = 0; }
+  void begin_tests() { progress_.tests = progress_.tested_at = 0; }
 
   robot::RobotModel robot_;
   std::int64_t version_;
   energy::DriveEquations equations_;
   energy::Refinement refinement_;
-  std::int64_t judged_ = 0;
-  // Of the carried payload over the declared one, over missions, weighted: 1, x, y, x x, x y; the newest ten
-  // count most.
-  std::array<double, 5> payload_sums_{};
-  std::int64_t changed_utime_us_ = 0;             // of the change from which on it is refined
-  std::size_t tests_ = 0;                         // of candidates for this version since then
-  std::size_t tested_at_ = 0;                     // missions used for training at the last one
-  std::deque<history::MissionKey> learned_from_;  // of the refinement's missions
+  RefinementProgress progress_;
 };
 
 }  // namespace joulecast::ingest
