@@ -76,10 +76,6 @@ ChargeWatch::Share ChargeWatch::add(const signals::Sample& sample, double modell
   return charging_.charging() ? Share::charger : Share::robot;
 }
 
-void ChargeWatch::interrupt() {
-  tracker_.interrupt();
-}
-
 ChargeView ChargeWatch::view() const {
   ChargeView out;
   out.estimate = tracker_.estimate();

@@ -38,7 +38,7 @@ class ChargeWatch {
 
   // Samples in order of time; `modelled_power_w` replaces an unmeasured current (NaN: not available).
   Share add(const signals::Sample& sample, double modelled_power_w);
-  void interrupt();
+  void interrupt() { tracker_.interrupt(); }
 
   ChargeView view() const;
   const battery::ChargeEstimate& estimate() const { return tracker_.estimate(); }

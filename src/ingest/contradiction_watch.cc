@@ -62,15 +62,11 @@ std::vector<Contradiction> contradictions_of(const plausibility::Observation& se
   for (plausibility::Check& check : plausibility::check_contradictions({&seen, 1}, robot)) {
     const ContradictionKind kind = kind_of(check.id);
     if (kind == ContradictionKind::constant && seen.moving_s < constant_s) continue;
-    Contradiction& c = found.emplace_back();
-    c.kind = kind;
-    c.untrue = (check.contradicted || kind == ContradictionKind::corrupt ||
-                (kind == ContradictionKind::limit && check.value > absurd_limit)) &&
-               enters_accounts(check.channel);
-    c.id = std::move(check.id);
-    c.channel = std::move(check.channel);
-    c.value = check.value;
-    c.says = std::move(check.says);
+    const bool untrue = (check.contradicted || kind == ContradictionKind::corrupt ||
+                         (kind == ContradictionKind::limit && check.value > absurd_limit)) &&
+                        enters_accounts(check.channel);
+    found.push_back(
+        {kind, std::move(check.id), std::move(check.channel), check.value, std::move(check.says), untrue});
   }
   return found;
 }
@@ -148,15 +144,11 @@ void ContradictionWatch::judge_messages() {
     const auto k = static_cast<std::size_t>(t.fault);
     const double share = static_cast<double>(faults_[k]) / static_cast<double>(messages_);
     if (share < telemetry::mistaken_share) continue;
-    Contradiction& c = found.emplace_back();
-    c.kind = t.kind;
-    c.id = t.id;
-    c.channel = t.channel;
-    c.value = share;
-    c.untrue = t.untrue;
-    c.says = fmt::format("{} of {} messages {}{}.", faults_[k], messages_, t.says,
-                         why_[k].empty() ? "" : " (" + why_[k] + ")");
-    if (t.untrue && in_mission_ && !told_in(untrue_messages_, c)) untrue_messages_.push_back(c);
+    std::string says = fmt::format("{} of {} messages {}{}.", faults_[k], messages_, t.says,
+                                   why_[k].empty() ? "" : " (" + why_[k] + ")");
+    found.push_back({t.kind, t.id, t.channel, share, std::move(says), t.untrue});
+    if (t.untrue && in_mission_ && !told_in(untrue_messages_, found.back()))
+      untrue_messages_.push_back(found.back());
   }
   const auto same = [](const Contradiction& a, const Contradiction& b) { return a.same(b); };
   if (!std::ranges::equal(found, of_messages_, same)) changed_ = true;
@@ -174,9 +166,7 @@ void ContradictionWatch::begin_mission(const std::string& mission_id, double pay
   changed_ = changed_ || !of_mission_.empty();
   of_mission_.clear();
   untrue_messages_.clear();
-  for (const Contradiction& c : of_messages_) {
-    if (c.untrue) untrue_messages_.push_back(c);
-  }
+  std::ranges::copy_if(of_messages_, std::back_inserter(untrue_messages_), &Contradiction::untrue);
 }
 
 void ContradictionWatch::add(const signals::Sample& sample) {
@@ -215,24 +205,17 @@ void ContradictionWatch::doubt_missions(std::optional<Contradiction> why) {
 
 void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool replace) {
   if (!replace) {
-    for (const Contradiction& c : of_channels_) {
+    for (const Contradiction& c : of_channels_)
       if (!told_in(found, c)) found.push_back(c);
-    }
   }
-  const auto in = [&](const std::vector<Contradiction>& list) {
-    return [&list](const Contradiction& c) { return told_in(list, c); };
-  };
-  if (found.size() != of_channels_.size() || !std::ranges::all_of(found, in(of_channels_))) changed_ = true;
-  keep_channels(std::move(found));
+  const auto was_told = [this](const Contradiction& c) { return told_in(of_channels_, c); };
+  changed_ |= found.size() != of_channels_.size() || !std::ranges::all_of(found, was_told);
+  recall(std::move(found));
 }
 
-void ContradictionWatch::keep_channels(std::vector<Contradiction> found) {
-  of_channels_ = std::move(found);
+void ContradictionWatch::recall(std::vector<Contradiction> of_mission) {
+  of_channels_ = std::move(of_mission);
   doubts_battery_ = ingest::doubts_battery(of_channels_);
-}
-
-void ContradictionWatch::recall(std::vector<Contradiction> of_last_mission) {
-  keep_channels(std::move(of_last_mission));
 }
 
 std::vector<Contradiction> ContradictionWatch::all() const {
@@ -241,10 +224,6 @@ std::vector<Contradiction> ContradictionWatch::all() const {
   std::ranges::copy(of_mission_, std::back_inserter(list));
   if (of_missions_) list.push_back(*of_missions_);
   return list;
-}
-
-bool ContradictionWatch::take_changed() {
-  return std::exchange(changed_, false);
 }
 
 }  // namespace joulecast::ingest

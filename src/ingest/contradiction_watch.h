@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynamics/drive_model.h"
@@ -44,18 +45,17 @@ class ContradictionWatch {
   // The contradictions of the newest messages and of the mission; of the last mission until the present one
   // is long enough.
   std::vector<Contradiction> all() const;
-  // The contradictions of the last mission before a restart; they remain until another mission is long
-  // enough.
-  void recall(std::vector<Contradiction> of_last_mission);
+  // The contradictions of the last mission, also of that before a restart; they remain until another mission
+  // is long enough.
+  void recall(std::vector<Contradiction> of_mission);
   // Whether all() has changed since the last call.
-  bool take_changed();
+  bool take_changed() { return std::exchange(changed_, false); }
   // Whether the battery's channels are contradicted.
   bool doubts_battery() const { return doubts_battery_; }
 
  private:
   void judge_messages();
   void judge_channels(std::vector<Contradiction> found, bool replace);
-  void keep_channels(std::vector<Contradiction> found);
 
   robot::RobotModel robot_;
   plausibility::Observer observer_;

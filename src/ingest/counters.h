@@ -84,9 +84,7 @@ struct IngestCounters {
   std::array<std::atomic<std::uint64_t>, left_out_count> missions_left_out{};
   telemetry::DatagramCounters datagrams;
 
-  void add(IngestFault fault, std::uint64_t count = 1) {
-    faults[static_cast<std::size_t>(fault)].fetch_add(count, std::memory_order_relaxed);
-  }
+  void add(IngestFault fault, std::uint64_t count = 1) { faults[static_cast<std::size_t>(fault)] += count; }
 };
 
 }  // namespace joulecast::ingest

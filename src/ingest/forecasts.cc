@@ -86,11 +86,10 @@ std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::strin
       for (const Json& leg : entry.at(1)) {
         const int motion = leg.at(0).get<int>();
         if (motion < 0 || motion >= static_cast<int>(forecast::motion_count)) return std::nullopt;
-        const auto planned = [&](std::size_t k) { return leg.size() > k ? leg.at(k).get<double>() : 0.0; };
-        mission.legs.push_back({static_cast<forecast::Motion>(motion), leg.at(1).get<double>(),
-                                leg.at(2).get<double>(), leg.at(3).get<double>(), leg.at(4).get<double>(),
-                                leg.at(5).get<double>(), leg.at(6).get<double>(), planned(7), planned(8),
-                                planned(9)});
+        const auto number = [&](std::size_t k) { return leg.at(k).get<double>(); };
+        const auto planned = [&](std::size_t k) { return leg.size() > k ? number(k) : 0.0; };
+        mission.legs.push_back({static_cast<forecast::Motion>(motion), number(1), number(2), number(3),
+                                number(4), number(5), number(6), planned(7), planned(8), planned(9)});
       }
       missions.push_back(std::move(mission));
     }
@@ -145,7 +144,6 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
   }
   lend(entry);
   borrow(entry);
-  entry.outlook.forecaster = entry.forecast->forecaster();
 }
 
 // A forecast that has learned from no mission yet.
@@ -157,6 +155,7 @@ void Forecasts::begin(Entry& entry) {
 }
 
 void Forecasts::lend(Entry& entry) {
+  entry.outlook.forecaster = entry.forecast->forecaster();
   auto found =
       std::make_shared<const std::array<forecast::OwnFinding, subject_count>>(entry.forecast->findings());
   const std::lock_guard lock(mutex_);
@@ -241,7 +240,6 @@ history::Learned Forecasts::learn(const std::shared_ptr<const ModelInForce>& mod
   if (!mission.legs.empty()) slot.kept.push_back(std::move(mission));
   while (slot.kept.size() > kept_missions) slot.kept.pop_front();
   lend(slot);
-  slot.outlook.forecaster = slot.forecast->forecaster();
   return document_of(slot);
 }
 
@@ -252,7 +250,6 @@ void Forecasts::set_change(const std::string& robot_id, const std::optional<drif
   if (slot.forecast == nullptr) return;
   slot.forecast->set_change(change);
   lend(slot);
-  slot.outlook.forecaster = slot.forecast->forecaster();
 }
 
 void Forecasts::learnt_elsewhere(const std::string& robot_id) {
@@ -289,7 +286,6 @@ std::optional<history::Learned> Forecasts::forget(const std::shared_ptr<const Mo
   bring_up(slot, model);
   if (!drop(slot, start_utime_us)) return std::nullopt;
   lend(slot);
-  slot.outlook.forecaster = slot.forecast->forecaster();
   return document_of(slot);
 }
 

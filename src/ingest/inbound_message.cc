@@ -22,7 +22,7 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
                                              const telemetry::Sender& sender, SignatureGate* signatures) {
   const std::optional<telemetry::ChannelName> name = telemetry::parse_channel(channel);
   if (!name || name->subject == telemetry::Subject::energy_state) return std::nullopt;
-  counters.messages.fetch_add(1, std::memory_order_relaxed);
+  ++counters.messages;
   InboundMessage message{std::string(name->robot_id), {}, host_utime_us, sender};
   const auto refuse = [&](IngestFault fault, std::string why) {
     counters.add(fault);

@@ -21,10 +21,6 @@ void Keeping::withdraw(Withdrawal withdrawal) {
   has_orders_.store(true, std::memory_order_release);
 }
 
-void Keeping::withdraw_all() {
-  for (const auto& [robot_id, epoch] : kept()) withdraw({robot_id, epoch, false});
-}
-
 std::map<std::string, std::int64_t> Keeping::heard() const {
   const std::lock_guard lock(mutex_);
   return {heard_.begin(), heard_.end()};

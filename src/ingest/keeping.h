@@ -41,7 +41,9 @@ class Keeping {
   void grant(Grant grant);
   void withdraw(Withdrawal withdrawal);
   // Withdraws all robots.
-  void withdraw_all();
+  void withdraw_all() {
+    for (const auto& [robot_id, epoch] : kept()) withdraw({robot_id, epoch, false});
+  }
   // The robots from which messages were received, by id, with the host's time of the last one.
   std::map<std::string, std::int64_t> heard() const;
   // Clears the times of the last messages: buffered messages are incomplete.

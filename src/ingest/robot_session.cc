@@ -230,8 +230,7 @@ void RobotSession::tell_contradictions(std::int64_t now) {
     if (first || now - told->second >= report_contradiction_us || now < told->second) {
       told->second = now;
       outputs_.warn(robot_id_, "contradiction: " + c.says);
-      outputs_.counters.contradictions[static_cast<std::size_t>(c.kind)].fetch_add(1,
-                                                                                   std::memory_order_relaxed);
+      ++outputs_.counters.contradictions[static_cast<std::size_t>(c.kind)];
       nlohmann::json detail = json_of(c);
       detail["mission"] =
           open_ != nullptr && open_->record.key > 0 ? nlohmann::json(open_->record.key) : nullptr;
@@ -265,14 +264,7 @@ void RobotSession::interrupt_meter() {
 }
 
 void RobotSession::doubt_clock(const char* id, double value, std::string says) {
-  Contradiction c;
-  c.kind = ContradictionKind::clock;
-  c.id = id;
-  c.channel = "utime";
-  c.value = value;
-  c.says = std::move(says);
-  c.untrue = true;
-  contradictions_->doubt_mission(std::move(c));
+  contradictions_->doubt_mission({ContradictionKind::clock, id, "utime", value, std::move(says), true});
 }
 
 void RobotSession::on_sample_before_start(const signals::Sample& sample) {
@@ -406,7 +398,7 @@ void RobotSession::on_charger_sample(const signals::Sample& sample) {
   snapshot_.modelled_power_w = signals::unmeasured;
   snapshot_.speed_m_s = snapshot_.yaw_rate_rad_s = 0;
   ++snapshot_.samples;
-  outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
+  ++outputs_.counters.samples;
   if (open_ == nullptr || open_->record.implicit) return;
   const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
   carry_out(step.actions);
@@ -448,19 +440,17 @@ void RobotSession::leave_charger() {
 bool RobotSession::teaches(const std::vector<Contradiction>& found) {
   history::Mission& record = open_->record;
   nlohmann::json untrue = nlohmann::json::array();
-  for (const Contradiction& c : found) {
+  for (const Contradiction& c : found)
     if (c.untrue) untrue.push_back(json_of(c));
-  }
   const signals::Accounts& a = record.accounts;
   const bool barely = a.measured_s > 0 && a.measured_s < least_measured * a.duration_s;
   if (untrue.empty() && !barely) return true;
   const auto why =
       static_cast<std::size_t>(untrue.empty() ? LeftOut::barely_measured : LeftOut::contradicted);
   ++snapshot_.missions_left_out[std::string(left_out_names[why])];
-  outputs_.counters.missions_left_out[why].fetch_add(1, std::memory_order_relaxed);
-  if (!untrue.empty()) {
+  ++outputs_.counters.missions_left_out[why];
+  if (!untrue.empty())
     record.findings_json = json_text(nlohmann::json{{"contradictions", std::move(untrue)}});
-  }
   return false;
 }
 
@@ -517,7 +507,7 @@ void RobotSession::on_own_sample(const Received& received) {
   if (open_->unmetered) open_->go_on_after_silence(sample.utime_us);
   open_->resumed_silent = false;
   ++snapshot_.samples;
-  outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
+  ++outputs_.counters.samples;
   if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
   meter(received.possible);
   keep(sample);  // as it came
@@ -634,16 +624,15 @@ void RobotSession::on_covariates(const signals::CovariateMessage& message, std::
   });
   snapshot_.map = covariates_.label_of("map");
   snapshot_.level = covariates_.label_of("level");
-  outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
+  outputs_.counters.covariate_changes += covariates_.pending() - before;
   if (open_ == nullptr || covariates_.pending() < settings_.checkpoint_samples) return;
   if (!open_->stored) begin_record();
   checkpoint();
 }
 
 void RobotSession::carry_out(const telemetry::MissionActions& actions) {
-  for (const telemetry::MissionAction& action : actions) {
+  for (const telemetry::MissionAction& action : actions)
     action.kind == telemetry::MissionAction::Kind::open ? open(action) : close(action);
-  }
 }
 
 void RobotSession::open(const telemetry::MissionAction& action) {
@@ -675,7 +664,7 @@ void RobotSession::begin_record() {
   record.key = key.value_or(0);
   if (record.key > 0) outputs_.post(history::StartMission{record});
   snapshot_.mission_key = record.key;
-  outputs_.counters.missions_started[record.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
+  ++outputs_.counters.missions_started[record.implicit ? 1 : 0];
 }
 
 void RobotSession::close(const telemetry::MissionAction& action) {
@@ -687,9 +676,8 @@ void RobotSession::close(const telemetry::MissionAction& action) {
       contradictions_ != nullptr ? contradictions_->end_mission() : std::vector<Contradiction>{};
   tell_contradictions(snapshot_.received_utime_us);
   if (open_->stored) {
-    outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
-        1, std::memory_order_relaxed);
-    refresh_record();
+    ++outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)];
+    if (meter_ != nullptr) open_->refresh(*meter_);
     const bool learn = teaches(found);
     if (learn) judge_mission();
     checkpoint();
@@ -718,13 +706,9 @@ void RobotSession::flush_meter(bool ended) {
   }
 }
 
-void RobotSession::refresh_record() {
-  if (meter_ != nullptr) open_->refresh(*meter_);
-}
-
 void RobotSession::checkpoint() {
   if (!open_->stored) return;
-  refresh_record();
+  if (meter_ != nullptr) open_->refresh(*meter_);
   history::CheckpointMission command;
   command.covariates = covariates_.settle(open_->record);
   command.mission = open_->record;

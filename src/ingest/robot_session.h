@@ -177,7 +177,6 @@ class RobotSession {
   void meter_with(std::shared_ptr<const ModelInForce> model);
   // `ended`: with the samples that wait for a decision on the step to them.
   void flush_meter(bool ended = true);
-  void refresh_record();
 
   std::string robot_id_;
   SessionSettings settings_;

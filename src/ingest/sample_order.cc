@@ -46,10 +46,6 @@ void SampleOrder::release(std::int64_t host_utime_us) {
   while (!waiting_.empty() && host_utime_us - since_us_ >= window_us_) pass_run();
 }
 
-void SampleOrder::flush() {
-  while (!waiting_.empty()) pass_run();
-}
-
 void SampleOrder::pass(const signals::Sample& sample) {
   next_ = sample.sequence + 1;
   newest_utime_us_ = sample.utime_us;

@@ -30,7 +30,9 @@ class SampleOrder {
   // Passes on the samples that have waited long enough.
   void release(std::int64_t host_utime_us);
   // Passes all on.
-  void flush();
+  void flush() {
+    while (!waiting_.empty()) pass_run();
+  }
 
  private:
   static constexpr std::size_t capacity = 256;

@@ -52,26 +52,19 @@ bool SenderGate::is_of_first(const InboundMessage& message, const signals::Sampl
 SenderGate::Verdict SenderGate::take(const InboundMessage& message) {
   const auto* sample = std::get_if<signals::Sample>(&message.content);
   heard_us_ = std::min(heard_us_, message.host_utime_us);  // the host's clock was set back
-  Verdict verdict;
-  verdict.released = release(message.host_utime_us);
-  Verdict own = is_of_first(message, sample) ? take_first(message, sample) : take_other(message);
-  verdict.pass = own.pass;
-  verdict.refused = own.refused;
+  std::vector<InboundMessage> released = release(message.host_utime_us);
+  Verdict verdict = is_of_first(message, sample) ? take_first(message, sample) : take_other(message);
+  verdict.released = std::move(released);
   return verdict;
 }
 
 SenderGate::Verdict SenderGate::take_first(const InboundMessage& message, const signals::Sample* sample) {
-  Verdict verdict;
-  verdict.pass = true;
+  Verdict verdict{.pass = true};
   if (sample == nullptr) {
     if (std::holds_alternative<signals::MissionEvent>(message.content)) announcer_ = message.sender;
     return verdict;
   }
-  if (is_second_stream(*sample, message.host_utime_us)) {
-    verdict.pass = false;
-    verdict.refused = 1;
-    return verdict;
-  }
+  if (is_second_stream(*sample, message.host_utime_us)) return {.refused = 1};
   if (!waiting_.empty()) {
     contested_us_ = message.host_utime_us;
     verdict.refused = drop_waiting();
@@ -84,18 +77,14 @@ SenderGate::Verdict SenderGate::take_first(const InboundMessage& message, const 
 }
 
 SenderGate::Verdict SenderGate::take_other(const InboundMessage& message) {
-  Verdict verdict;
   const std::size_t needed = message_units(message);
   const bool third = !waiting_.empty() && message.sender != other_;
-  if (third || needed > room_ || waiting_units_ + needed > waiting_units_a_robot) {
-    verdict.refused = 1;
-    return verdict;
-  }
+  if (third || needed > room_ || waiting_units_ + needed > waiting_units_a_robot) return {.refused = 1};
   other_ = message.sender;
   waiting_.push_back(message);
   waiting_units_ += needed;
   room_ -= needed;
-  return verdict;
+  return {};
 }
 
 bool SenderGate::is_second_stream(const signals::Sample& sample, std::int64_t host_utime_us) {

@@ -24,9 +24,9 @@ class SenderGate : boost::noncopyable {
   ~SenderGate() { drop_waiting(); }
 
   struct Verdict {
-    std::vector<InboundMessage> released;  // pass first
-    bool pass = false;                     // the message itself; else it waits or is refused
-    std::size_t refused = 0;               // it and such that waited
+    std::vector<InboundMessage> released = {};  // pass first
+    bool pass = false;                          // the message itself; else it waits or is refused
+    std::size_t refused = 0;                    // it and such that waited
   };
   Verdict take(const InboundMessage& message);
   // Returns messages that have waited long enough; all of them when `now` is the end of time.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/fault_boundary.h"
+#include "base/json_number.h"
 #include "base/try.h"
 #include "ingest/model_loading.h"
 #include "ingest/refinement_watch.h"
@@ -27,15 +28,9 @@ std::vector<Contradiction> contradictions_of(const Mission& ended) {
     if (!each.is_object()) continue;
     const auto kind = std::ranges::find(contradiction_kind_names, each.value("kind", ""));
     if (kind == contradiction_kind_names.end()) continue;
-    Contradiction& c = found.emplace_back();
-    c.kind = static_cast<ContradictionKind>(kind - contradiction_kind_names.begin());
-    c.id = each.value("id", "");
-    c.channel = each.value("channel", "");
-    const auto value = each.find("value");
-    c.value = value != each.end() && value->is_number() ? value->get<double>() : signals::unmeasured;
-    c.says = each.value("says", "");
-    c.untrue = true;
-    c.told_utime_us = ended.end_utime_us;
+    found.push_back({static_cast<ContradictionKind>(kind - contradiction_kind_names.begin()),
+                     each.value("id", ""), each.value("channel", ""), number_at(each, "value"),
+                     each.value("says", ""), true, ended.end_utime_us});
   }
   return found;
 }
@@ -102,10 +97,6 @@ Result<StoredRobot> read_stored_robot(const history::Store& store, const std::st
 std::vector<Contradiction> stored_contradictions(const history::Store& store, const std::string& robot_id) {
   const auto last = ended_missions(store, robot_id, 1);
   return last && !last->empty() ? contradictions_of(last->front()) : std::vector<Contradiction>{};
-}
-
-void RobotReader::start() {
-  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 void RobotReader::want(const std::string& robot_id, history::Epoch epoch) {

@@ -58,7 +58,9 @@ class RobotReader {
   using Read = std::function<Result<StoredRobot>(const std::string& robot_id)>;
   explicit RobotReader(Read read) : read_(std::move(read)) {}
 
-  void start();
+  void start() {
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
   // What was not read yet is read by take().
   void stop() { thread_ = {}; }
 
