@@ -38,16 +38,8 @@ bool Fields::has(std::string_view name) const {
   return found != object_.end() && !found->is_null();
 }
 
-std::string Fields::pointer(std::string_view name) const {
-  return at_ + "/" + std::string(name);
-}
-
 void Fields::fault(std::string_view name, std::string message) {
   fault(Error{Fault::invalid, pointer(name), std::move(message)});
-}
-
-void Fields::fault(Error error) {
-  if (!error_) error_ = std::move(error);
 }
 
 const Json* Fields::member(std::string_view name) {

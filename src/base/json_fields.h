@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/bounds.h"
@@ -38,10 +39,12 @@ class Fields {
   const nlohmann::json* required(std::string_view name);
 
   bool has(std::string_view name) const;
-  std::string pointer(std::string_view name) const;
+  std::string pointer(std::string_view name) const { return at_ + "/" + std::string(name); }
   void fault(std::string_view name, std::string message);
   // For constraints between fields, or found by a nested reader.
-  void fault(Error error);
+  void fault(Error error) {
+    if (!error_) error_ = std::move(error);
+  }
   bool ok() const { return !error_.has_value(); }
 
   Result<void> finish();

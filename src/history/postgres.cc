@@ -117,19 +117,11 @@ class PostgresStatement final : public Statement {
   int columns() const override { return PQnfields(result_.get()); }
   Type type(int column) const override {
     if (PQgetisnull(result_.get(), row_, column)) return Type::null;
-    switch (PQftype(result_.get(), column)) {
-      case bool_oid:
-      case int2_oid:
-      case int4_oid:
-      case int8_oid:
-        return Type::integer;
-      case float8_oid:
-        return Type::real;
-      case bytea_oid:
-        return Type::blob;
-      default:
-        return Type::text;
-    }
+    const unsigned oid = PQftype(result_.get(), column);
+    if (oid == float8_oid) return Type::real;
+    if (oid == bytea_oid) return Type::blob;
+    const bool whole = oid == bool_oid || oid == int2_oid || oid == int4_oid || oid == int8_oid;
+    return whole ? Type::integer : Type::text;
   }
   std::int64_t integer(int column) const override {
     if (type(column) == Type::real) return static_cast<std::int64_t>(real(column));
@@ -305,10 +297,6 @@ void PostgresDatabase::enter_pipeline() {
 
 void PostgresDatabase::sent_later() {
   if (++sent_ >= max_sent) finish_later();
-}
-
-void PostgresDatabase::finish_later() {
-  if (sent_ > 0) (void)read_sent();
 }
 
 PostgresResult PostgresDatabase::read_sent() {

@@ -32,7 +32,9 @@ class PostgresDatabase final : public Database {
   std::unique_ptr<Statement> prepare(std::string_view sql) override;
   bool has_table(std::string_view name) override;
   bool is_postgres() const override { return true; }
-  void finish_later() override;
+  void finish_later() override {
+    if (sent_ > 0) (void)read_sent();
+  }
   bool is_usable() const override;
   bool in_transaction() const override;
   void begin(Access access) override;

@@ -8,16 +8,8 @@
 namespace joulecast::history {
 
 Fault SqlError::fault() const {
-  switch (kind_) {
-    case Kind::corrupt:
-      return Fault::corrupt;
-    case Kind::unavailable:
-    case Kind::connection_lost:
-    case Kind::commit_unknown:
-      return Fault::unavailable;
-    default:
-      return Fault::internal;
-  }
+  if (kind_ == Kind::corrupt) return Fault::corrupt;
+  return kind_ == Kind::values || kind_ == Kind::internal ? Fault::internal : Fault::unavailable;
 }
 
 Rows& Rows::bind(std::int64_t value) {

@@ -98,18 +98,6 @@ BulkRows::BulkRows(std::string table, std::string columns,
   collected_.resize(row_.size());
 }
 
-std::string& BulkRows::at(int parameter) {
-  return row_.at(static_cast<std::size_t>(parameter));
-}
-
-void BulkRows::bind_null(int parameter) {
-  at(parameter) = "NULL";
-}
-
-void BulkRows::bind(int parameter, std::int64_t value) {
-  at(parameter) = fmt::to_string(value);
-}
-
 void BulkRows::bind(int parameter, double value) {
   at(parameter) = fmt::to_string(value);
 }
@@ -136,10 +124,6 @@ void BulkRows::step_later() {
     collected_[k] += row_[k];
   }
   any_ = true;
-}
-
-void BulkRows::reset() {
-  for (std::string& value : row_) value = "NULL";
 }
 
 void BulkRows::clear() {

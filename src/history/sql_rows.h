@@ -183,13 +183,15 @@ class BulkRows final : public Statement {
   // Discards the collected rows.
   void clear();
 
-  void bind_null(int parameter) override;
-  void bind(int parameter, std::int64_t value) override;
+  void bind_null(int parameter) override { at(parameter) = "NULL"; }
+  void bind(int parameter, std::int64_t value) override { at(parameter) = std::to_string(value); }
   void bind(int parameter, double value) override;
   void bind(int parameter, std::string_view value) override;
   void bind(int parameter, std::span<const std::byte> value) override;
   void step_later() override;
-  void reset() override;
+  void reset() override {
+    for (std::string& value : row_) value = "NULL";
+  }
 
   // It gives no rows.
   bool step() override { return false; }
@@ -202,7 +204,7 @@ class BulkRows final : public Statement {
 
  private:
   std::string from() const;
-  std::string& at(int parameter);
+  std::string& at(int parameter) { return row_.at(static_cast<std::size_t>(parameter)); }
 
   const std::string table_, columns_;
   const std::function<std::string(const std::string&)> sql_;

@@ -17,29 +17,17 @@ namespace joulecast::history {
 namespace {
 
 SqlError::Kind kind_of(int code) {
-  switch (code & 0xff) {
-    case SQLITE_CONSTRAINT:
-    case SQLITE_TOOBIG:
-    case SQLITE_MISMATCH:
-      return SqlError::Kind::values;
-    case SQLITE_CORRUPT:
-    case SQLITE_NOTADB:
-      return SqlError::Kind::corrupt;
-    case SQLITE_FULL:
-    case SQLITE_IOERR:
-    case SQLITE_BUSY:
-    case SQLITE_LOCKED:
-    case SQLITE_CANTOPEN:
-    case SQLITE_READONLY:
-    case SQLITE_PERM:
-    case SQLITE_AUTH:
-    case SQLITE_NOMEM:
-    case SQLITE_INTERRUPT:
-    case SQLITE_PROTOCOL:
-      return SqlError::Kind::unavailable;
-    default:
-      return SqlError::Kind::internal;
-  }
+  using enum SqlError::Kind;
+  static constexpr std::pair<int, SqlError::Kind> kinds[] = {
+      {SQLITE_CONSTRAINT, values},    {SQLITE_TOOBIG, values},        {SQLITE_MISMATCH, values},
+      {SQLITE_CORRUPT, corrupt},      {SQLITE_NOTADB, corrupt},       {SQLITE_FULL, unavailable},
+      {SQLITE_IOERR, unavailable},    {SQLITE_BUSY, unavailable},     {SQLITE_LOCKED, unavailable},
+      {SQLITE_CANTOPEN, unavailable}, {SQLITE_READONLY, unavailable}, {SQLITE_PERM, unavailable},
+      {SQLITE_AUTH, unavailable},     {SQLITE_NOMEM, unavailable},    {SQLITE_INTERRUPT, unavailable},
+      {SQLITE_PROTOCOL, unavailable}};
+  for (const auto& [each, kind] : kinds)
+    if (each == (code & 0xff)) return kind;
+  return internal;
 }
 
 [[noreturn]] void raise_error(sqlite3* database, int code, std::string_view doing) {
@@ -92,18 +80,11 @@ class SqliteStatement final : public Statement {
 
   int columns() const override { return sqlite3_column_count(handle_); }
   Type type(int column) const override {
-    switch (sqlite3_column_type(handle_, column)) {
-      case SQLITE_INTEGER:
-        return Type::integer;
-      case SQLITE_FLOAT:
-        return Type::real;
-      case SQLITE_TEXT:
-        return Type::text;
-      case SQLITE_BLOB:
-        return Type::blob;
-      default:
-        return Type::null;
-    }
+    const int type = sqlite3_column_type(handle_, column);
+    if (type == SQLITE_INTEGER) return Type::integer;
+    if (type == SQLITE_FLOAT) return Type::real;
+    if (type == SQLITE_TEXT) return Type::text;
+    return type == SQLITE_BLOB ? Type::blob : Type::null;
   }
   std::int64_t integer(int column) const override { return sqlite3_column_int64(handle_, column); }
   double real(int column) const override { return sqlite3_column_double(handle_, column); }
@@ -172,14 +153,6 @@ bool SqliteDatabase::in_transaction() const {
 
 void SqliteDatabase::begin(Access access) {
   Rows(statement(access == Access::write ? "BEGIN IMMEDIATE" : "BEGIN")).run();
-}
-
-void SqliteDatabase::commit() {
-  Rows(statement("COMMIT")).run();
-}
-
-void SqliteDatabase::roll_back() {
-  Rows(statement("ROLLBACK")).run();
 }
 
 FileLock::~FileLock() {

@@ -25,8 +25,8 @@ class SqliteDatabase final : public Database {
   bool has_table(std::string_view name) override;
   bool in_transaction() const override;
   void begin(Access access) override;
-  void commit() override;
-  void roll_back() override;
+  void commit() override { Rows(statement("COMMIT")).run(); }
+  void roll_back() override { Rows(statement("ROLLBACK")).run(); }
 
  private:
   sqlite3* handle_ = nullptr;

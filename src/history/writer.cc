@@ -486,8 +486,4 @@ void Writer::refuse(Waiter& waiter, Error why) {
   waiter.done.notify_all();
 }
 
-void Writer::tell(const Error& error) const {
-  if (options_.on_error) options_.on_error(error);
-}
-
 }  // namespace joulecast::history

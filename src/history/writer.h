@@ -147,7 +147,9 @@ class Writer {
   std::int64_t prune(const Command& command);
   void end();
   static void refuse(Waiter& waiter, Error why);
-  void tell(const Error& error) const;
+  void tell(const Error& error) const {
+    if (options_.on_error) options_.on_error(error);
+  }
 
   Store& store_;
   const WriterOptions options_;
