@@ -126,26 +126,6 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
   });
 }
 
-// joulecast_store_healthy reports a store whose sizes cannot be read.
-void export_store(Metrics& metrics, StoreSizes& sizes) {
-  metrics.series([&sizes]() -> AllSeries {
-    const auto s = sizes.read();
-    return {
-        {"joulecast_store_bytes", "Size of the database file", s.database_bytes},
-        {"joulecast_store_journal_bytes", "Size of the write-ahead log", s.journal_bytes},
-        {"joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept", s.telemetry_bytes}};
-  });
-}
-
-void export_streams(Metrics& metrics, const http::EventHub& events) {
-  metrics.series([&events]() -> AllSeries {
-    const auto s = events.counts();
-    return {{"joulecast_event_streams", "Clients of the event stream", s.subscribers},
-            {"joulecast_event_streams_dropped_total", "Clients of the event stream dropped for being slow",
-             s.dropped_clients}};
-  });
-}
-
 // Fields of /proc/self/stat from the third on, proc(5): the second, the program's name, may hold spaces.
 std::vector<double> stat_fields() {
   std::ifstream file("/proc/self/stat");
@@ -230,8 +210,20 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
   export_missions(metrics, counters);
   export_fleet(metrics, fleet, std::move(now_utime_us));
   export_writer(metrics, writer);
-  export_store(metrics, sizes);
-  export_streams(metrics, events);
+  // joulecast_store_healthy reports a store whose sizes cannot be read.
+  metrics.series([&sizes]() -> AllSeries {
+    const auto s = sizes.read();
+    return {
+        {"joulecast_store_bytes", "Size of the database file", s.database_bytes},
+        {"joulecast_store_journal_bytes", "Size of the write-ahead log", s.journal_bytes},
+        {"joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept", s.telemetry_bytes}};
+  });
+  metrics.series([&events]() -> AllSeries {
+    const auto s = events.counts();
+    return {{"joulecast_event_streams", "Clients of the event stream", s.subscribers},
+            {"joulecast_event_streams_dropped_total", "Clients of the event stream dropped for being slow",
+             s.dropped_clients}};
+  });
 }
 
 void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {

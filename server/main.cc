@@ -14,13 +14,17 @@ namespace {
 
 using joulecast::Invocation;
 
-// Waits for SIGINT or SIGTERM, reloads at SIGHUP, feeding the watchdog while every loop turns.
-void run(joulecast::Application& application) {
+// Those that run() waits for.
+sigset_t awaited_signals() {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGHUP);
+  for (const int each : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&signals, each);
+  return signals;
+}
+
+// Waits for SIGINT or SIGTERM, reloads at SIGHUP, feeding the watchdog while every loop turns.
+void run(joulecast::Application& application) {
+  const sigset_t signals = awaited_signals();
   std::uint64_t watchdog_us = 0;
   const bool watched = sd_watchdog_enabled(0, &watchdog_us) > 0;
   const std::uint64_t period_us = watched ? watchdog_us / 3 : 10'000'000;
@@ -37,11 +41,7 @@ void run(joulecast::Application& application) {
 int serve(const joulecast::DaemonOptions& options) {
   joulecast::configure_logging(options.log_format, options.log_level);
   // Every thread inherits the mask, so that only run() sees these signals.
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGHUP);
+  const sigset_t signals = awaited_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 

@@ -42,10 +42,6 @@ Csv::Csv(const http::Request& request, std::vector<std::string> columns)
   end_row();
 }
 
-void Csv::separate() {
-  if (std::exchange(comma_, true)) text_ += ',';
-}
-
 Csv& Csv::field(std::string_view text) {
   separate();
   const bool guarded = may_be_formula(text);
@@ -73,10 +69,6 @@ Csv& Csv::field(std::int64_t number) {
   separate();
   text_ += std::to_string(number);
   return *this;
-}
-
-Csv& Csv::field(bool truth) {
-  return field(truth ? "true" : "false");
 }
 
 void Csv::end_row() {

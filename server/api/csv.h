@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "server/http/message.h"
@@ -23,7 +24,7 @@ class Csv {
   Csv& field(double number);  // resolved() (base/json_writer.h) and rounded
   Csv& exact(double number);  // all digits, for raw data
   Csv& field(std::int64_t number);
-  Csv& field(bool truth);
+  Csv& field(bool truth) { return field(truth ? "true" : "false"); }
   void end_row();
   // A row of an item's JSON. Null is an empty field, texts of an array are separated by blanks, an object is
   // JSON.
@@ -36,7 +37,9 @@ class Csv {
                           std::string_view next_cursor);
 
  private:
-  void separate();
+  void separate() {
+    if (std::exchange(comma_, true)) text_ += ',';
+  }
 
   const std::vector<std::string> columns_;
   int digits_;

@@ -322,10 +322,6 @@ Result<Response> proposals(const Services& services, const Request& request) {
   return proposals_of(services, request, id);
 }
 
-Result<Response> all_proposals(const Services& services, const Request& request) {
-  return proposals_of(services, request, std::nullopt);
-}
-
 }  // namespace
 
 Part model_part() {
@@ -359,7 +355,10 @@ Part model_part() {
             .csv = true,
             .error_statuses = {404}});
   rows.add(Method::get, "/v1/proposals", "listFleetProposals", Role::read,
-           "Model proposals for the robots of the fleet, newest first", "proposal-list", all_proposals,
+           "Model proposals for the robots of the fleet, newest first", "proposal-list",
+           [](const Services& services, const Request& request) {
+             return proposals_of(services, request, std::nullopt);
+           },
            {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
             .csv = true});
   const Schema robot =

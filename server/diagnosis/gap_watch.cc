@@ -23,16 +23,12 @@ struct Memory {
   std::int64_t announced_utime_us = 0;  // the newest mark that was announced
   bool stood_out = false;
 };
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE_WITH_DEFAULT(Memory, announced_utime_us, stood_out)
 
 Result<Memory> read_memory(const history::Store& store, const std::string& robot_id) {
-  Memory memory;
   TRY_ASSIGN(const auto learned, store.learned(robot_id, topic));
-  if (!learned) return memory;
-  const Json body = Json::parse(learned->body_json, nullptr, false);
-  if (!body.is_object()) return memory;
-  memory.announced_utime_us = body.value("announced_utime_us", std::int64_t{0});
-  memory.stood_out = body.value("stood_out", false);
-  return memory;
+  const Json body = learned ? Json::parse(learned->body_json, nullptr, false) : Json();
+  return body.is_object() ? body.get<Memory>() : Memory{};
 }
 
 // The cause that the parameters of an effect change with: wear, floor, battery, load, sensors; "model" where
@@ -101,17 +97,13 @@ void GapWatch::record(const std::string& robot_id, const std::string& kind, std:
 
 Result<void> GapWatch::remember(const std::string& robot_id, std::int64_t announced_utime_us,
                                 bool stood_out) {
-  const Json body = {{"announced_utime_us", announced_utime_us}, {"stood_out", stood_out}};
+  const Json body = Memory{announced_utime_us, stood_out};
   return parts_.writer.execute(history::PutLearned{{robot_id, topic, parts_.now_utime_us(), body.dump()}})
       .map([](const auto&) {});
 }
 
 bool GapWatch::watches(const std::string& robot_id) const {
   return options_.robots.empty() || options_.robots.contains(robot_id);
-}
-
-bool GapWatch::is_own(const std::string& robot_id) const {
-  return !options_.is_own || options_.is_own(robot_id);
 }
 
 void GapWatch::look() {

@@ -81,7 +81,7 @@ class GapWatch {
   Result<void> announce_sibling(const drift::SiblingRatio& sibling, std::size_t compared_with);
   Result<void> remember(const std::string& robot_id, std::int64_t announced_utime_us, bool stood_out);
   bool watches(const std::string& robot_id) const;
-  bool is_own(const std::string& robot_id) const;
+  bool is_own(const std::string& robot_id) const { return !options_.is_own || options_.is_own(robot_id); }
   void record(const std::string& robot_id, const std::string& kind, std::string detail_json);
 
   const Parts parts_;

@@ -231,10 +231,6 @@ std::shared_ptr<StreamSource> coded(Coding coding, std::shared_ptr<StreamSource>
   return std::make_shared<CodedStream>(coding, std::move(inner));
 }
 
-bool Cors::allows(std::string_view origin) const {
-  return std::ranges::find(origins_, origin) != origins_.end();
-}
-
 void Cors::add_headers(const Request& request, Response& response) const {
   if (origins_.empty()) return;
   response.headers.emplace_back("Vary", "Origin");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -24,7 +25,7 @@ class Cors {
  public:
   explicit Cors(std::vector<std::string> allowed_origins) : origins_(std::move(allowed_origins)) {}
 
-  bool allows(std::string_view origin) const;
+  bool allows(std::string_view origin) const { return std::ranges::find(origins_, origin) != origins_.end(); }
 
   // Adds the headers that the browser requires in an answer, and in the answer to a preflight request.
   void add_headers(const Request& request, Response& response) const;

@@ -158,12 +158,4 @@ void HttpMetrics::exchanged(const Exchange& exchange) {
   received_bytes_.add(static_cast<double>(exchange.request_bytes));
 }
 
-void HttpMetrics::refused(Refusal refusal) {
-  refusals_[static_cast<std::size_t>(refusal)].add();
-}
-
-void HttpMetrics::connections(std::size_t open) {
-  connections_ = open;
-}
-
 }  // namespace joulecast::http

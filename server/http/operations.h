@@ -42,8 +42,8 @@ class HttpMetrics : public ServerObserver {
   explicit HttpMetrics(Metrics& metrics);
 
   void exchanged(const Exchange& exchange) override;
-  void refused(Refusal refusal) override;
-  void connections(std::size_t open) override;
+  void refused(Refusal refusal) override { refusals_[static_cast<std::size_t>(refusal)].add(); }
+  void connections(std::size_t open) override { connections_ = open; }
 
  private:
   struct Series {

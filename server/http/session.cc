@@ -84,10 +84,6 @@ std::shared_ptr<Peer> Core::peer_of(const std::string& name) {
   return known;
 }
 
-void Core::forget_peers() {
-  std::erase_if(peers, [](const auto& each) { return each.second.use_count() == 1; });
-}
-
 std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, Caller caller) {
   if (core->tls) return make_tls_session(std::move(core), std::move(socket), std::move(caller));
   return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), std::move(caller));

@@ -85,7 +85,9 @@ struct Core {
   std::shared_ptr<Peer> peer_of(const net::ip::address& address);
   std::shared_ptr<Peer> peer_of(const std::string& name);
   // Removes peers that hold no resource.
-  void forget_peers();
+  void forget_peers() {
+    std::erase_if(peers, [](const auto& each) { return each.second.use_count() == 1; });
+  }
 
   const ServerOptions options;
   const Router& router;
