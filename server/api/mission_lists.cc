@@ -18,20 +18,11 @@ namespace {
 using history::MissionOrder;
 using Type = Parameter::Type;
 
-constexpr std::array<std::pair<std::string_view, MissionOrder>, 12> orders{{
-    {"start", MissionOrder::start},
-    {"robot", MissionOrder::robot},
-    {"mission", MissionOrder::mission},
-    {"state", MissionOrder::state},
-    {"duration", MissionOrder::duration},
-    {"distance", MissionOrder::distance},
-    {"payload", MissionOrder::payload},
-    {"energy", MissionOrder::energy},
-    {"modelled", MissionOrder::modelled},
-    {"ratio", MissionOrder::ratio},
-    {"wh_per_km", MissionOrder::wh_per_km},
-    {"charge", MissionOrder::charge},
-}};
+// In the order of MissionOrder.
+constexpr std::array<std::string_view, 12> orders{"start",    "robot",    "mission",   "state",
+                                                  "duration", "distance", "payload",   "energy",
+                                                  "modelled", "ratio",    "wh_per_km", "charge"};
+static_assert(static_cast<MissionOrder>(orders.size() - 1) == MissionOrder::charge);
 
 Result<history::MissionFilter> filter_of(const Request& request) {
   history::MissionFilter filter;
@@ -84,11 +75,9 @@ std::vector<Parameter> filter_parameters() {
 }
 
 std::vector<Parameter> sort_parameters() {
-  std::vector<std::string> names;
-  for (const auto& [name, order] : orders) names.emplace_back(name);
   return {{.name = "sort",
            .description = "sort key, default start; missions without a value come last",
-           .choices = std::move(names)},
+           .choices = {orders.begin(), orders.end()}},
           {.name = "order",
            .description = "asc: least, oldest or first in the alphabet first; desc if absent",
            .choices = {"asc", "desc"}}};
@@ -97,8 +86,8 @@ std::vector<Parameter> sort_parameters() {
 history::MissionSort sort_of(const Request& request) {
   history::MissionSort sort;
   sort.ascending = request.query_value("order") == "asc";
-  for (const auto& [name, order] : orders)
-    if (request.query_value("sort") == name) sort.by = order;
+  if (const auto by = request.query_value("sort"))
+    sort.by = static_cast<MissionOrder>(std::ranges::find(orders, *by) - orders.begin());
   return sort;
 }
 

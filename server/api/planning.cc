@@ -26,16 +26,9 @@ namespace {
 using Json = nlohmann::json;
 
 std::string_view name_of(Fault fault) {
-  switch (fault) {
-    case Fault::invalid:
-      return "invalid";
-    case Fault::not_found:
-      return "not_found";
-    case Fault::infeasible:
-      return "infeasible";
-    default:
-      return "internal";
-  }
+  if (fault == Fault::invalid) return "invalid";
+  if (fault == Fault::not_found) return "not_found";
+  return fault == Fault::infeasible ? "infeasible" : "internal";
 }
 
 struct Row {

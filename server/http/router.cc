@@ -74,30 +74,24 @@ bool is_json_type(std::string_view type) {
 }
 
 std::optional<std::string> broken_constraint(const Parameter& parameter, std::string_view text) {
-  switch (parameter.type) {
-    case Parameter::Type::text: {
-      const auto& choices = parameter.choices;
-      if (choices.empty() || std::ranges::find(choices, text) != choices.end()) return std::nullopt;
-      std::string message = "must be one of";
-      for (const auto& choice : choices) message += " " + choice;
-      return message;
-    }
-    case Parameter::Type::boolean:
-      if (text == "true" || text == "false") return std::nullopt;
-      return "must be true or false";
-    case Parameter::Type::integer:
-    case Parameter::Type::number: {
-      const bool whole = parameter.type == Parameter::Type::integer;
-      const auto value =
-          whole ? std::optional<double>(to_number<std::int64_t>(text)) : to_number<double>(text);
-      if (!value) return whole ? "must be an integer" : "must be a finite number";
-      const Bounds none,
-          bounds{parameter.minimum.value_or(none.minimum), parameter.maximum.value_or(none.maximum)};
-      if (!bounds.contain(*value)) return out_of_bounds(*value, bounds);
-      return std::nullopt;
-    }
+  using Type = Parameter::Type;
+  if (parameter.type == Type::text) {
+    const auto& choices = parameter.choices;
+    if (choices.empty() || std::ranges::find(choices, text) != choices.end()) return std::nullopt;
+    std::string message = "must be one of";
+    for (const auto& choice : choices) message += " " + choice;
+    return message;
   }
-  return std::nullopt;
+  if (parameter.type == Type::boolean)
+    return text == "true" || text == "false" ? std::nullopt
+                                             : std::optional<std::string>("must be true or false");
+  const bool whole = parameter.type == Type::integer;
+  const auto value = whole ? std::optional<double>(to_number<std::int64_t>(text)) : to_number<double>(text);
+  if (!value) return whole ? "must be an integer" : "must be a finite number";
+  const Bounds none,
+      bounds{parameter.minimum.value_or(none.minimum), parameter.maximum.value_or(none.maximum)};
+  if (bounds.contain(*value)) return std::nullopt;
+  return out_of_bounds(*value, bounds);
 }
 
 // The code that found an error names the field in its own terms; here it gets the name that the client used.
