@@ -192,9 +192,9 @@ void Observer::take_power(const Cell& c) {
   relate(Relation::motors, {vb, ib, vr, vl, ir, il}, {c.battery_power_w, c.motor_power_w, 1.0});
   relate(Relation::motion, {wr, wl, vb, ib}, {c.battery_power_w, modelled, 1.0});
   const double current_change = c.mean[ib] - battery_[1];
-  const bool braking = std::max(battery_[2], modelled - idle) < 0;
-  relate(Relation::sag, {vb, ib}, {c.mean[vb] - battery_[0], current_change, braking ? current_change : 0.0});
-  battery_ = {c.mean[vb], c.mean[ib], modelled - idle};
+  const bool charged = std::max(battery_[2], modelled) < 0;
+  relate(Relation::sag, {vb, ib}, {c.mean[vb] - battery_[0], current_change, charged ? current_change : 0.0});
+  battery_ = {c.mean[vb], c.mean[ib], modelled};
   if (c.resting) relate(Relation::idle, {wr, wl, vb, ib}, {c.battery_power_w, 1.0});
   if (c.way[0] == 0 && c.way[1] == 0) return;
   const double speed = 0.5 * robot_.kinematics.wheel_radius_m * (c.mean[wr] + c.mean[wl]);

@@ -36,7 +36,7 @@ enum class Relation : std::size_t {
   idle,     // battery power, 1; standing
   motion,   // battery power, the model's, 1
   sag,      // changes of the battery's voltage, of its current, from one cell to the next; the
-            // latter again, or 0 unless the motors brake in both
+            // latter again, or 0 unless the model charges the battery in both
   climb,    // battery power less the model's, m g v sin(pitch), 1
   gyro,     // yaw rate, w right, w left, 1
   way,      // speed of the robot by the wheels, its magnitude, 1
@@ -114,7 +114,7 @@ class Observer {
   std::optional<CellCutter> cells_;
   SpanCutter spans_;
   std::size_t cells_in_block_ = 0;
-  std::array<double, 3> battery_{};  // voltage, current, power by the model without idling; of the last cell
+  std::array<double, 3> battery_{};  // voltage, current, power by the model; of the last cell
   std::optional<signals::Sample> before_,
       waiting_;                // a spike is detected from the next sample
   signals::Sample known_;      // last measured position and yaw rate ...
