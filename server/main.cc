@@ -14,7 +14,7 @@ namespace {
 
 using joulecast::Invocation;
 
-// Those that run() waits for.
+// The signals that run() waits for.
 sigset_t awaited_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -124,11 +124,16 @@ int care_for_store(const Invocation& invocation) {
     complain(path.error());
     return 2;
   }
-  using Action = Invocation::Action;
-  if (invocation.action == Action::backup) return back_up(*path, invocation.file);
-  if (invocation.action == Action::restore) return restore(invocation.file, *path);
-  if (invocation.action == Action::salvage) return salvage(*path, invocation.file);
-  return check_store(*path);
+  switch (invocation.action) {
+    case Invocation::Action::backup:
+      return back_up(*path, invocation.file);
+    case Invocation::Action::restore:
+      return restore(invocation.file, *path);
+    case Invocation::Action::salvage:
+      return salvage(*path, invocation.file);
+    default:
+      return check_store(*path);
+  }
 }
 
 }  // namespace
@@ -156,9 +161,13 @@ int main(int argc, char** argv) {
       return print(joulecast::openapi_document());
     case Invocation::Action::print_config_schema:
       return print(joulecast::settings_schema());
+    case Invocation::Action::check_store:
+    case Invocation::Action::backup:
+    case Invocation::Action::restore:
+    case Invocation::Action::salvage:
+      return care_for_store(*invocation);
     case Invocation::Action::run:
       return serve(invocation->settings.options());
-    default:
-      return care_for_store(*invocation);
   }
+  return 2;
 }

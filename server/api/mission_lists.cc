@@ -86,7 +86,7 @@ std::vector<Parameter> sort_parameters() {
 history::MissionSort sort_of(const Request& request) {
   history::MissionSort sort;
   sort.ascending = request.query_value("order") == "asc";
-  if (const auto by = request.query_value("sort"))
+  if (const auto by = request.query_value("sort"))  // one of the choices
     sort.by = static_cast<MissionOrder>(std::ranges::find(orders, *by) - orders.begin());
   return sort;
 }

@@ -60,11 +60,16 @@ std::map<std::int64_t, std::string> dismissals(const Services& services,
 // The reason why a proposal is not offered; absent for one that is.
 std::optional<std::string> closed_reason(const Services& services, const history::Proposal& p,
                                          const std::map<std::int64_t, std::string>& dismissed) {
-  if (p.state == history::ProposalState::adopted)
-    return "adopted" + (p.adopted_version ? " as version " + std::to_string(*p.adopted_version) : "");
-  if (p.state == history::ProposalState::dismissed)
-    return "dismissed" + (dismissed.contains(p.id) ? ": " + dismissed.at(p.id) : " by a person");
-  if (p.state == history::ProposalState::superseded) return "a later proposal took its place";
+  switch (p.state) {
+    case history::ProposalState::adopted:
+      return "adopted" + (p.adopted_version ? " as version " + std::to_string(*p.adopted_version) : "");
+    case history::ProposalState::dismissed:
+      return "dismissed" + (dismissed.contains(p.id) ? ": " + dismissed.at(p.id) : " by a person");
+    case history::ProposalState::superseded:
+      return "a later proposal took its place";
+    case history::ProposalState::open:
+      break;
+  }
   return moot_of(services, p);
 }
 

@@ -82,9 +82,10 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
     for (const auto& choice : choices) message += " " + choice;
     return message;
   }
-  if (parameter.type == Type::boolean)
-    return text == "true" || text == "false" ? std::nullopt
-                                             : std::optional<std::string>("must be true or false");
+  if (parameter.type == Type::boolean) {
+    if (text == "true" || text == "false") return std::nullopt;
+    return "must be true or false";
+  }
   const bool whole = parameter.type == Type::integer;
   const auto value = whole ? std::optional<double>(to_number<std::int64_t>(text)) : to_number<double>(text);
   if (!value) return whole ? "must be an integer" : "must be a finite number";

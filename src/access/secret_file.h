@@ -15,7 +15,7 @@ namespace joulecast::access {
 
 // The content of a file. Fault::invalid where every user of the machine may read it.
 Result<std::string> read_private_file(const std::string& path, std::size_t max_bytes = max_text_file_bytes);
-// The same without the whitespace around it; Fault::invalid also where that are fewer than `least` bytes.
+// The same without the whitespace around it; Fault::invalid also where fewer than `least` bytes remain.
 Result<std::string> read_secret(const std::string& path, std::size_t least);
 
 // The new file next to the old one, as `<path>.new`, which exists only while it is written.

@@ -1,7 +1,6 @@
 #include "answers/battery_dialects.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string_view>
 #include <vector>
@@ -157,9 +156,6 @@ const Table<BatteryStatus>& ros_table() {
   return table;
 }
 
-// In the order of Dialect, from vda5050_3_0 on.
-constexpr std::array tables{vda5050_3_0_table, vda5050_2_1_table, massrobotics_table, ros_table};
-
 }  // namespace
 
 BatteryStatus battery_status(const robot::Battery& battery, const forecast::ChargeMap& map,
@@ -194,12 +190,26 @@ BatteryStatus battery_status(const robot::Battery& battery, const forecast::Char
 
 described::Schema battery_status_schema() {
   Schema forms = Schema::array();
-  for (const auto& table : tables) forms.push_back(table().of_member());
+  for (const Table<BatteryStatus>* table :
+       {&vda5050_3_0_table(), &vda5050_2_1_table(), &massrobotics_table(), &ros_table()})
+    forms.push_back(table->of_member());
   return {{"title", "Battery message of another standard"}, {"anyOf", std::move(forms)}};
 }
 
 std::string battery_dialect(Dialect dialect, const BatteryStatus& status) {
-  return tables.at(static_cast<std::size_t>(dialect) - 1)().text(status);
+  switch (dialect) {
+    case Dialect::joulecast:
+      break;
+    case Dialect::vda5050_3_0:
+      return vda5050_3_0_table().text(status);
+    case Dialect::vda5050_2_1:
+      return vda5050_2_1_table().text(status);
+    case Dialect::massrobotics:
+      return massrobotics_table().text(status);
+    case Dialect::ros:
+      return ros_table().text(status);
+  }
+  return "{}";
 }
 
 }  // namespace joulecast::answers

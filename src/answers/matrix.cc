@@ -441,12 +441,19 @@ void Matrix::State::state_availability(const Robot& robot, MatrixRow& out) {
 
 std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r,
                                      const std::optional<Error>& limits) const {
-  if (obstacle == Obstacle::payload)
-    return fmt::format("this robot carries at most {} kg", robots[r].model->robot.limits.payload_kg);
-  if (obstacle == Obstacle::limits) return limits ? describe(*limits) : "no motion within the limits";
-  if (obstacle == Obstacle::pose)
-    return "the robot reports no pose; state it in the request, or the way to the pick-up";
-  return robots[r].problem;
+  switch (obstacle) {
+    case Obstacle::none:
+      break;
+    case Obstacle::payload:
+      return fmt::format("this robot carries at most {} kg", robots[r].model->robot.limits.payload_kg);
+    case Obstacle::limits:
+      return limits ? describe(*limits) : std::string("no motion within the limits");
+    case Obstacle::pose:
+      return "the robot reports no pose; state it in the request, or the way to the pick-up";
+    case Obstacle::model:
+      return robots[r].problem;
+  }
+  return {};
 }
 
 Matrix::Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables)

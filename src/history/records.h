@@ -130,7 +130,7 @@ struct TraceBucket {
   Band measured_power_w;            // out of the battery positive
   Band modelled_power_w;
   Band speed_m_s;
-  double state_of_charge = signals::unmeasured;  // at the bucket's end, 0 to 1
+  double state_of_charge = signals::unmeasured;  // the latest known in the bucket, 0 to 1
   double measured_j = signals::unmeasured;       // since the mission's start, at the bucket's end
   double modelled_j = signals::unmeasured;       // since the mission's start, at the bucket's end
   double x_m = signals::unmeasured;              // mean position

@@ -42,7 +42,7 @@ struct FloorChoice {
 };
 
 struct Visits {
-  std::vector<std::vector<FloorVisit>> of;  // of each mission
+  std::vector<std::vector<FloorVisit>> by_mission;
   std::int64_t points = 0;
 };
 
@@ -144,9 +144,9 @@ std::size_t next_at_once(std::span<const FloorChoice::Chosen> chosen) {
   return count;
 }
 
-Result<Visits> floor_visits(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m) {
+Result<Visits> read_visits(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m) {
   Visits visits;
-  visits.of.resize(chosen.size());
+  visits.by_mission.resize(chosen.size());
   if (chosen.empty()) return visits;
   Rows rows(database, select_points());
   for (std::size_t k = 0; k < missions_at_once; ++k) rows.bind(chosen[std::min(k, chosen.size() - 1)].key);
@@ -155,13 +155,13 @@ Result<Visits> floor_visits(Database& database, std::span<const FloorChoice::Cho
   while (rows.next()) {
     const MissionKey key = rows.integer();
     if (chosen[at].key != key) {
-      visits.of[at] = mission.take();
+      visits.by_mission[at] = mission.take();
       while (chosen[at].key != key) ++at;
     }
     mission.add(rows);
     ++visits.points;
   }
-  visits.of[at] = mission.take();
+  visits.by_mission[at] = mission.take();
   return visits;
 }
 
@@ -171,9 +171,9 @@ FloorSums& FloorSums::operator+=(const FloorSums& more) {
   covered_s += more.covered_s;
   distance_m += more.distance_m;
   energy_j += more.energy_j;
+  driving_j += more.driving_j;
   measured_j += more.measured_j;
   modelled_j += more.modelled_j;
-  driving_j += more.driving_j;
   return *this;
 }
 
@@ -188,10 +188,10 @@ Result<FloorReading> Store::floor_visits(const MissionFilter& filter, double cel
   for (std::span rest(choice.chosen); !rest.empty();) {
     const auto part = rest.first(next_at_once(rest));
     TRY_ASSIGN(const auto visits,
-               read([&](Database& database) { return history::floor_visits(database, part, cell_m); }));
+               read([&](Database& database) { return read_visits(database, part, cell_m); }));
     reading.points += visits.points;
     for (std::size_t k = 0; k < part.size(); ++k, ++reading.missions_read)
-      if (!sink({part[k].key, part[k].robot_id, visits.of[k]})) return reading;
+      if (!sink({part[k].key, part[k].robot_id, visits.by_mission[k]})) return reading;
     rest = rest.subspan(part.size());
   }
   return reading;

@@ -143,10 +143,10 @@ struct FloorSums {
   double covered_s = 0;
   double distance_m = 0;  // sum of the absolute mean speeds of the seconds
   double energy_j = 0;    // measured, or modelled where it was not
+  double driving_j = 0;   // of energy_j
   // Over the seconds of driving in which both are available.
   double measured_j = 0;
   double modelled_j = 0;
-  double driving_j = 0;  // of energy_j
 
   FloorSums& operator+=(const FloorSums& more);
 };

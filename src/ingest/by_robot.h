@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <shared_mutex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -29,25 +30,25 @@ class ByRobot {
   }
   // Null: there is none.
   Pointer find(std::string_view robot_id) const {
-    const std::lock_guard lock(mutex_);
+    const std::shared_lock lock(mutex_);
     const auto found = latest_.find(robot_id);
     return found == latest_.end() ? nullptr : found->second;
   }
   // By robot id.
   std::vector<Pointer> all() const {
-    const std::lock_guard lock(mutex_);
+    const std::shared_lock lock(mutex_);
     std::vector<Pointer> values;
     values.reserve(latest_.size());
     for (const auto& [id, value] : latest_) values.push_back(value);
     return values;
   }
   std::size_t size() const {
-    const std::lock_guard lock(mutex_);
+    const std::shared_lock lock(mutex_);
     return latest_.size();
   }
 
  private:
-  mutable std::mutex mutex_;
+  mutable std::shared_mutex mutex_;
   std::map<std::string, Pointer, std::less<>> latest_;
 };
 

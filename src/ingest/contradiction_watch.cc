@@ -210,11 +210,11 @@ void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool r
   }
   const auto was_told = [this](const Contradiction& c) { return told_in(of_channels_, c); };
   changed_ |= found.size() != of_channels_.size() || !std::ranges::all_of(found, was_told);
-  recall(std::move(found));
+  keep_channels(std::move(found));
 }
 
-void ContradictionWatch::recall(std::vector<Contradiction> of_mission) {
-  of_channels_ = std::move(of_mission);
+void ContradictionWatch::keep_channels(std::vector<Contradiction> found) {
+  of_channels_ = std::move(found);
   doubts_battery_ = ingest::doubts_battery(of_channels_);
 }
 

@@ -47,7 +47,7 @@ class ContradictionWatch {
   std::vector<Contradiction> all() const;
   // The contradictions of the last mission, also of that before a restart; they remain until another mission
   // is long enough.
-  void recall(std::vector<Contradiction> of_mission);
+  void recall(std::vector<Contradiction> of_last_mission) { keep_channels(std::move(of_last_mission)); }
   // Whether all() has changed since the last call.
   bool take_changed() { return std::exchange(changed_, false); }
   // Whether the battery's channels are contradicted.
@@ -56,6 +56,7 @@ class ContradictionWatch {
  private:
   void judge_messages();
   void judge_channels(std::vector<Contradiction> found, bool replace);
+  void keep_channels(std::vector<Contradiction> found);
 
   robot::RobotModel robot_;
   plausibility::Observer observer_;

@@ -52,8 +52,10 @@ struct RobotSnapshot {
 };
 
 // The latest snapshot of every robot.
-class FleetView : public ByRobot<RobotSnapshot> {
+class FleetView : ByRobot<RobotSnapshot> {
  public:
+  using ByRobot::all, ByRobot::find, ByRobot::Pointer, ByRobot::remove, ByRobot::size;
+
   void publish(Pointer snapshot) {
     const std::string& robot_id = snapshot->robot_id;
     put(robot_id, std::move(snapshot));

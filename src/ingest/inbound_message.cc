@@ -43,12 +43,18 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
       message.content = std::move((*decoded).*part);
     }
   };
-  if (name->subject == telemetry::Subject::telemetry)
-    take(telemetry::decode_telemetry(data), &telemetry::DecodedTelemetry::sample);
-  else if (name->subject == telemetry::Subject::covariates)
-    take(telemetry::decode_covariates(data), &telemetry::DecodedCovariates::message);
-  else
-    take(telemetry::decode_mission_event(data), &telemetry::DecodedMissionEvent::event);
+  switch (name->subject) {
+    case telemetry::Subject::telemetry:
+      take(telemetry::decode_telemetry(data), &telemetry::DecodedTelemetry::sample);
+      break;
+    case telemetry::Subject::covariates:
+      take(telemetry::decode_covariates(data), &telemetry::DecodedCovariates::message);
+      break;
+    case telemetry::Subject::mission_event:
+    case telemetry::Subject::energy_state:
+      take(telemetry::decode_mission_event(data), &telemetry::DecodedMissionEvent::event);
+      break;
+  }
   return message;
 }
 

@@ -17,8 +17,10 @@ using answers::ModelInForce;
 Error unknown_robot(std::string field, std::string_view robot_id);
 
 // The models in force.
-class ModelRegistry : public ByRobot<ModelInForce> {
+class ModelRegistry : ByRobot<ModelInForce> {
  public:
+  using ByRobot::all, ByRobot::find, ByRobot::Pointer, ByRobot::size;
+
   // Puts a robot's model in force; an effect that the catalogue rejects is an error and changes nothing.
   Result<void> put(robot::RobotModel robot, std::int64_t version);
   // Puts one in force that was before.

@@ -6,11 +6,19 @@ namespace joulecast::ingest {
 namespace {
 
 history::MissionState state_of(telemetry::MissionEnd end) {
-  using telemetry::MissionEnd;
-  if (end == MissionEnd::aborted) return history::MissionState::aborted;
-  if (end == MissionEnd::superseded) return history::MissionState::superseded;
-  if (end == MissionEnd::unfinished) return history::MissionState::unfinished;
-  return history::MissionState::finished;
+  switch (end) {
+    case telemetry::MissionEnd::finished:
+    case telemetry::MissionEnd::idle:
+    case telemetry::MissionEnd::expired:
+      return history::MissionState::finished;
+    case telemetry::MissionEnd::aborted:
+      return history::MissionState::aborted;
+    case telemetry::MissionEnd::superseded:
+      return history::MissionState::superseded;
+    case telemetry::MissionEnd::unfinished:
+      return history::MissionState::unfinished;
+  }
+  return history::MissionState::unfinished;
 }
 
 constexpr const char* service_was_down = "the service was down during the mission";

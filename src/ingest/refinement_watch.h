@@ -16,7 +16,7 @@
 
 namespace joulecast::ingest {
 
-// The state of a refinement that survives restarts, with the refinement's own memory.
+// The state that survives restarts, besides the refinement's own memory.
 struct RefinementProgress {
   std::int64_t judged = 0;  // missions
   // Of the carried payload over the declared one, over missions, weighted: 1, x, y, x x, x y; the newest ten

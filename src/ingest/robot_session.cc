@@ -360,19 +360,24 @@ void RobotSession::place(const signals::Sample& sample) {
   const ChargeWatch::Share share = charge_->add(trusted, modelled_power_w);
   snapshot_.state_of_charge = charge_->estimate().charge;
   changed_ = true;
-  if (share == ChargeWatch::Share::undecided) {
-    held_.push_back(received);
-  } else if (share == ChargeWatch::Share::charger) {
-    if (!std::exchange(at_charger_, true)) {
-      interrupt_meter();
-      refinement_->interrupt();
-    }
-    for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front().sample);
-    on_charger_sample(sample);
-  } else {
-    if (at_charger_) leave_charger();
-    release_held();
-    on_own_sample(received);
+  switch (share) {
+    case ChargeWatch::Share::undecided:
+      held_.push_back(received);
+      break;
+    case ChargeWatch::Share::charger:
+      if (!at_charger_) {
+        at_charger_ = true;
+        interrupt_meter();
+        refinement_->interrupt();
+      }
+      for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front().sample);
+      on_charger_sample(sample);
+      break;
+    case ChargeWatch::Share::robot:
+      if (at_charger_) leave_charger();
+      release_held();
+      on_own_sample(received);
+      break;
   }
   if (charge_->utime_us() - remembered_utime_us_ >= remember_charge_us) remember_charge();
 }

@@ -7,6 +7,7 @@ namespace joulecast::ingest {
 void TraceBuilder::begin() {
   finished_.clear();
   open_.reset();
+  touched_ = false;
 }
 
 void TraceBuilder::add(const energy::MeterPoint& point, const signals::Accounts& accounts,

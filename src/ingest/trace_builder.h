@@ -13,7 +13,7 @@ namespace joulecast::ingest {
 class TraceBuilder {
  public:
   void begin();
-  // `accounts` and `state_of_charge` (0 to 1; NaN: unknown) as of the point.
+  // `accounts` and `state_of_charge` (0 to 1; NaN: unknown, the latest known one stays) as of the point.
   void add(const energy::MeterPoint& point, const signals::Accounts& accounts, double state_of_charge);
   // The buckets that changed since the last call; the newest one may come again, fuller.
   std::vector<history::TraceBucket> take();
