@@ -261,7 +261,7 @@ struct GapTest {
   energy::BackTest replayed;
   Result<energy::RegressionComparison> beside_regression;
 
-  // To writing the corrected file; empty without.
+  // The objection to writing the corrected file; empty: there is none.
   std::string objection() const {
     if (!replayed.improves()) return "the back-test shows no improvement";
     if (!beside_regression || !beside_regression->regression_wins()) return {};

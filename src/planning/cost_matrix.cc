@@ -90,6 +90,7 @@ struct Recorder {
 
 std::string_view name_of(Obstacle obstacle) {
   constexpr std::array<std::string_view, 5> names = {"none", "payload", "limits", "pose", "model"};
+  static_assert(static_cast<Obstacle>(names.size() - 1) == Obstacle::model);
   return names[static_cast<std::size_t>(obstacle)];
 }
 

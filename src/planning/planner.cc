@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -636,6 +637,7 @@ Limits limits_of(const robot::RobotModel& robot) {
 
 std::string_view name_of(Method method) {
   constexpr std::array<std::string_view, 4> names = {"closed_form", "quadrature", "interior_point", "mixed"};
+  static_assert(static_cast<Method>(names.size() - 1) == Method::mixed);
   return names[static_cast<std::size_t>(method)];
 }
 

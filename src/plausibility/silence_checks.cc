@@ -157,14 +157,14 @@ bool never_negative(const ValueTally& t) {
 void check_unsigned_battery(const CheckContext& c, Checks& checks) {
   if (!never_negative(c.tally(reading::battery_current))) return;
   const BlockFit fit = fit_blocks(c.blocks(Relation::sag), 0, {1, 2});
-  const Estimate driving = estimate(fit, 0), braking = estimate(fit, Eigen::Vector2d(1, 1));
-  if (!driving.sure() || driving.value > 0 || !braking.sure() || braking.value < 0) return;
-  const Estimate ratio = braking * (-1 / driving.value);
+  const Estimate driving = estimate(fit, 0), charging = estimate(fit, Eigen::Vector2d(1, 1));
+  if (!driving.sure() || driving.value > 0 || !charging.sure() || charging.value < 0) return;
+  const Estimate ratio = charging * (-1 / driving.value);
   if (ratio.interval()[1] < 1) return;
   add_check(checks, "battery_current_unsigned", "battery_current", ratio, true,
-            "battery_current is never negative, and while the motors brake the battery's voltage rises with "
-            "it, {} times as much as it falls otherwise: its sign is lost; joulecast expects it positive "
-            "while discharging.",
+            "battery_current is never negative, and while the motors charge the battery its voltage rises "
+            "with it, {} times as much as it falls otherwise: its sign is lost; joulecast expects it "
+            "positive while discharging.",
             with_interval(ratio));
 }
 

@@ -34,7 +34,7 @@ struct Motion {
   std::map<std::string_view, std::vector<double>> columns = {};
 };
 
-// Empty without a profile in which all columns are as long.
+// Empty unless the columns of a profile have the same length.
 std::optional<Motion> motion_of(const Json& holder, std::string label, std::string_view style) {
   Motion motion{std::move(label), style};
   if (!holder.is_object() || !holder.contains("profile") || !holder["profile"].is_object())

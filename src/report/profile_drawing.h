@@ -8,8 +8,8 @@
 
 namespace joulecast::report {
 
-// The motion of a profile answer and its baselines over time, as an SVG document: speed where one drives, yaw
-// rate where one turns, power and energy. Fault::corrupt where the answer has no columns.
+// The motion of a profile or estimate, with its baselines, over time, as an SVG document: speed where one
+// drives, yaw rate where one turns, power and energy. Fault::corrupt where the answer has no columns.
 [[nodiscard]] Result<std::string> draw_answer(const nlohmann::json& answer);
 
 // Round values that span a range.

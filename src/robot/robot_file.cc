@@ -66,7 +66,7 @@ bool is_kind(bool fits, std::string_view kind, const Json& value, const std::str
   return fits;
 }
 
-// Also of a number out of bounds, which is a problem.
+// A number out of bounds is a problem and is returned.
 std::optional<double> number(const Json& value, const std::string& pointer, const Bounds& bounds,
                              std::string_view key, Problems& problems) {
   if (!is_kind(value.is_number(), "a number", value, pointer, problems)) return std::nullopt;
@@ -79,11 +79,6 @@ std::optional<double> number(const Json& value, const std::string& pointer, cons
 std::optional<std::vector<double>> numbers(const Json& value, const std::string& pointer,
                                            const Bounds& bounds, std::string_view key, Problems& problems) {
   if (!is_kind(value.is_array(), "an array of numbers", value, pointer, problems)) return std::nullopt;
-  if (value.size() > max_curve_points) {
-    problems.add(pointer,
-                 fmt::format("has {} numbers, must have at most {}", value.size(), max_curve_points));
-    return std::nullopt;
-  }
   std::vector<double> out;
   for (std::size_t i = 0; i < value.size(); ++i) {
     const auto element = number(value[i], fmt::format("{}/{}", pointer, i), bounds, key, problems);
@@ -123,22 +118,26 @@ void read(const Json& value, const std::string& pointer, const Field& field, std
 
 void read(const Json& value, const std::string& pointer, const Field& field, std::array<double, 2>& out,
           Problems& problems) {
-  const auto both = numbers(value, pointer, field.bounds, field.key(), problems);
-  if (!both) return;
-  if (both->size() != 2) {
-    problems.add(pointer, fmt::format("has {} numbers, must have 2: [right, left]", both->size()));
-    return;
-  }
-  std::copy(both->begin(), both->end(), out.begin());
+  if (value.is_array() && value.size() != out.size())
+    problems.add(pointer, fmt::format("has {} numbers, must have 2: [right, left]", value.size()));
+  else if (const auto both = numbers(value, pointer, field.bounds, field.key(), problems))
+    std::copy(both->begin(), both->end(), out.begin());
 }
 
 void read(const Json& value, const std::string& pointer, const Field& field, Curve& out, Problems& problems) {
   if (!object_of(value, pointer, {"charge", field.value_key}, problems)) return;
+  const auto wrong_count = [&](std::size_t count) {
+    problems.add(pointer, fmt::format("has {} points, must have 2 to {}", count, max_curve_points));
+  };
   const auto column = [&](std::string_view key, const Bounds& bounds) -> std::optional<std::vector<double>> {
     const std::string at = child(pointer, key);
-    if (const auto found = value.find(key); found != value.end())
+    const auto found = value.find(key);
+    if (found == value.end())
+      problems.add(at, "is missing");
+    else if (found->size() > max_curve_points)
+      wrong_count(found->size());
+    else
       return numbers(*found, at, bounds, key, problems);
-    problems.add(at, "is missing");
     return std::nullopt;
   };
   const auto charge = column("charge", fraction), values = column(field.value_key, field.bounds);
@@ -149,8 +148,7 @@ void read(const Json& value, const std::string& pointer, const Field& field, Cur
                                       values->size(), field.value_key));
     return;
   }
-  if (count < 2)
-    problems.add(pointer, fmt::format("has {} points, must have 2 to {}", count, max_curve_points));
+  if (count < 2) wrong_count(count);
   for (std::size_t i = 0; i < count; ++i) {
     if (i > 0 && !((*charge)[i] > (*charge)[i - 1]))
       problems.add(
@@ -422,14 +420,15 @@ Result<RobotModel> load_robot(const std::filesystem::path& path) {
 }
 
 Result<void> validate(const RobotModel& model) {
-  const auto keys_of_effects = [](const RobotModel& of) {
-    std::size_t count = of.effects.size();
-    for (const AdoptedEffect& effect : of.effects) count += effect.parameters.size();
-    return count;
-  };
-  TRY_ASSIGN(const RobotModel again, read_robot(robot_to_json(model)));
-  if (keys_of_effects(again) != keys_of_effects(model))
-    return invalid("/effects", "has an effect, or an effect a parameter, twice");
+  std::set<std::string> keys;  // of effects and of their parameters
+  for (const AdoptedEffect& effect : model.effects) {
+    const std::string of_effect = child("/effects", effect.id);
+    if (!keys.insert(of_effect).second) return invalid(of_effect, "is given twice");
+    for (const auto& [name, value] : effect.parameters)
+      if (const std::string key = child(of_effect, name); !keys.insert(key).second)
+        return invalid(key, "is given twice");
+  }
+  TRY(read_robot(robot_to_json(model)));
   return {};
 }
 

@@ -546,8 +546,8 @@ TEST(CheckContradictions, AcceptsRegenerationOnDescent) {
 // Braking charges the battery and raises its voltage, which a current without a sign contradicts.
 TEST(CheckContradictions, FindsRectifiedBatteryCurrent) {
   robot::RobotModel model = carrier();
-  // Share of the rise of voltage while charging; half of it is not that of a sign. A battery of which the
-  // load at rest exceeds the braking power is never charged.
+  // Share of the rise of voltage while charging; half of it is not that of a sign. A load at rest that
+  // exceeds the braking power never lets the battery be charged.
   for (const auto& [positive, share, load_w] :
        {std::tuple{false, 1.0, 0.0}, {true, 1.0, 0.0}, {true, 0.5, 0.0}, {true, 1.0, 1000.0}}) {
     model.idle_power_w = 2 + load_w;

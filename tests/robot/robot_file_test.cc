@@ -261,6 +261,23 @@ TEST(RobotFile, ChecksModelsBuiltInCode) {
   ASSERT_FALSE(checked);
   EXPECT_EQ(checked.error().field, "/motor/gear_ratio");
   EXPECT_THAT(checked.error().message, HasSubstr("/effects/load_rolling/c_rr"));
+  model = full_model();
+  model.effects[0].parameters.push_back(model.effects[0].parameters[0]);
+  const auto twice = validate(model);
+  ASSERT_FALSE(twice);
+  EXPECT_EQ(twice.error(), (Error{Fault::invalid, "/effects/load_rolling/c_rr", "is given twice"}));
+}
+
+TEST(RobotFile, StatesRequiredCounts) {
+  json document = robot_to_json(full_model());
+  auto& curve = document["battery"]["open_circuit_voltage"];
+  curve["charge"] = curve["voltage_v"] = json::array_t(max_curve_points + 1, 0.5);
+  EXPECT_EQ(error_of(document),
+            (Error{Fault::invalid, "/battery/open_circuit_voltage", "has 1002 points, must have 2 to 1001"}));
+  document = robot_to_json(full_model());
+  document["motor"]["friction_torque_nm"] = json::array_t(max_curve_points + 1, 1e9);
+  EXPECT_EQ(error_of(document), (Error{Fault::invalid, "/motor/friction_torque_nm",
+                                       "has 1002 numbers, must have 2: [right, left]"}));
 }
 
 TEST(BatteryFile, MatchesBatteryObject) {
