@@ -7,8 +7,7 @@
 namespace joulecast::server {
 namespace {
 
-std::string rounded(JsonWriter& json) {
-  std::string text = json.take();
+std::string rounded(std::string text) {
   http::round_numbers(text, http::usual_digits);
   return text;
 }
@@ -20,9 +19,8 @@ void FleetEvents::publish_contradictions(const ingest::RobotSnapshot& now, Publi
     std::int64_t& last = published.contradictions[c.id + ' ' + c.channel];
     if (last == c.told_utime_us) continue;
     last = c.told_utime_us;
-    JsonWriter json;
-    api::contradiction_event_table().write(json, {now.robot_id, c});
-    hub_.publish("contradiction", rounded(json), now.robot_id);
+    hub_.publish("contradiction", rounded(api::contradiction_event_table().text({now.robot_id, c})),
+                 now.robot_id);
   }
 }
 
@@ -36,9 +34,7 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     if (published.snapshot != nullptr && published.snapshot->mission_key > 0 &&
         published.snapshot->mission_key != snapshot->mission_key) {
       if (const auto mission = services_.store.mission(published.snapshot->mission_key)) {
-        JsonWriter json;
-        answers::mission_table().write(json, *mission);
-        const std::string text = rounded(json);
+        const std::string text = rounded(answers::mission_table().text(*mission));
         hub_.publish("mission", text, snapshot->robot_id);
         mission_ended_(*mission, text);
       }
@@ -46,11 +42,10 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     if (published.snapshot == snapshot && published.live == live) continue;
     publish_contradictions(*snapshot, published);
     const auto model = services_.models.find(snapshot->robot_id);
-    JsonWriter json;
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = services_.forecasts.reach(model, *snapshot);
-    api::state_table().write(json, {*snapshot, reach, now_utime_us});
-    hub_.publish_newest("state", rounded(json), snapshot->robot_id);
+    hub_.publish_newest("state", rounded(api::state_table().text({*snapshot, reach, now_utime_us})),
+                        snapshot->robot_id);
     published.snapshot = snapshot;
     published.live = live;
   }

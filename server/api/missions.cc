@@ -61,10 +61,8 @@ class MissionSummaries {
   Result<Response> read(const Request& request) {
     const std::uint64_t commits = services_.writer.status().commits;
     TRY_ASSIGN(const history::Mission mission, mission_of(services_, request));
-    JsonWriter json;
-    answers::mission_table().write(json, mission);
     Response response;
-    response.shared_body = std::make_shared<const std::string>(json.take());
+    response.shared_body = std::make_shared<const std::string>(answers::mission_table().text(mission));
     const std::lock_guard lock(mutex_);
     if (commits > commits_ || texts_.size() >= most_texts) texts_.clear();
     if (commits >= commits_) {
