@@ -313,7 +313,8 @@ const Table<TaskOutlook>& stage_table() {
   using S = TaskOutlook;
   static const auto table =
       Table<S>()
-          .number_or_null("expected_energy_j", &S::mean_j, "mean of the distribution of this leg's energy")
+          .number_or_null("expected_energy_j", &S::mean_j,
+                          "mean energy of this leg; independent of later ones")
           .number_or_null("ends_after_s", &S::duration_s, "expected time from now to its end")
           .number_or_null("success_probability", &S::probability,
                           "probability that the reserve is not used until its end")
@@ -390,8 +391,7 @@ const Table<PlanAnswer>& plan_table() {
       Table<P>()
           .number_or_null("success_probability", AT(outlook.probability),
                           "probability of finishing all tasks and reaching the charger with the reserve")
-          .number_or_null("expected_energy_j", AT(outlook.mean_j),
-                          "mean of the distribution with the quantiles energy_j")
+          .number_or_null("expected_energy_j", AT(outlook.mean_j), "mean total energy, the sum over the legs")
           .number_or_null("duration_s", AT(outlook.duration_s[1]), "median")
           .object("energy_j", AT(outlook.energy_j), "total energy at the quantiles 5, 50 and 95 %",
                   quantiles_table())
@@ -423,7 +423,7 @@ const Table<Outlook>& end_table() {
   static const auto table =
       Table<Outlook>()
           .number_or_null("success_probability", &Outlook::probability, "probability that the charge lasts")
-          .number_or_null("expected_energy_j", &Outlook::mean_j, "mean of the forecast's distribution")
+          .number_or_null("expected_energy_j", &Outlook::mean_j, "mean energy, the sum over the legs")
           .number_or_null("duration_s", AT(duration_s[1]), "of the tasks")
           .object("arrival_charge", charge_at_end, "charge at the end at the quantiles 5, 50 and 95 %",
                   quantiles_table());

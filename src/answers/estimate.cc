@@ -111,16 +111,16 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
       forecast::price(forecaster, pricer, legs, {}, drive.way.halts_stated() || forecast::states_halts(legs));
   if (const auto stuck = forecast::obstacle(pricer, legs, priced)) return tl::unexpected(*stuck);
   const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
-  const forecast::Prediction expected = forecaster.energy(sum);
+  const forecast::Prediction energy = forecaster.energy(sum);
   EstimateOutput out;
   out.siblings_pending = robot.siblings_pending;
-  out.accounts.battery_j = expected.mean();
+  out.accounts.battery_j = energy.expected();
   out.accounts.duration_s = forecaster.duration(sum).quantile(0.5);
   out.accounts.distance_m = path.distance_m();
   out.accounts.turned_rad = path.turned_rad();
   auto& quantiles = out.energy_quantiles_j.emplace();
   std::ranges::transform(forecast::stated_quantiles, quantiles.begin(),
-                         [&](double q) { return expected.quantile(q); });
+                         [&](double q) { return energy.quantile(q); });
   return out;
 }
 

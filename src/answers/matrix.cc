@@ -384,7 +384,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
       continue;
     }
     const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
-    cell.energy_j = forecaster.energy(sum).mean();
+    cell.energy_j = forecaster.energy(sum).expected();
     cell.duration_s = forecaster.duration(sum).quantile(0.5);
     if (!robot.charge) continue;
     const auto probability = [&](double charge) {

@@ -185,16 +185,13 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
   if (out.charger_given) extend(whole, forecaster, tasks.empty() ? from_here : tasks.back().to_charger);
   const Prediction all = forecaster.energy(whole);
   const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected()));
-  // The excess of the mean over the corrected energy is distributed by energy, so that the parts add up to
-  // the mean.
-  const double mean_share = all.expected() > 0 ? all.mean() / all.expected() : 1;
 
-  double corrected_before = 0, probability_before = 1, worst = 0;
+  double expected_before = 0, probability_before = 1, worst = 0;
   const auto note = [&](TaskOutlook& stage_outlook, const PlanSum& sum, std::size_t index) {
     stage_outlook = stage(forecaster, battery, charge, lowest, sum);
-    const double corrected = forecaster.energy(sum).expected();
-    stage_outlook.mean_j = mean_share * (corrected - corrected_before);
-    corrected_before = corrected;
+    const double expected = forecaster.energy(sum).expected();
+    stage_outlook.mean_j = expected - expected_before;
+    expected_before = expected;
     // Energy only grows along the way, so a reserve once broken stays broken.
     stage_outlook.probability = std::min(stage_outlook.probability, probability_before);
     if (const double lost = probability_before - stage_outlook.probability; lost > worst) {
@@ -207,7 +204,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
   out.tasks.resize(tasks.size());
   for (std::size_t k = 0; k < tasks.size(); ++k) note(out.tasks[k], sums[k + 1], k);
   if (out.charger_given) note(out.charger.emplace(), whole, tasks.size());
-  out.mean_j = all.mean();
+  out.mean_j = all.expected();
   for (std::size_t k = 0; k < stated_quantiles.size(); ++k)
     out.energy_j[k] = all.quantile(stated_quantiles[k]);
   const Prediction duration = forecaster.duration(whole);

@@ -79,10 +79,6 @@ double Prediction::quantile(double probability) const {
   return at_score(inflation * scores->quantile(probability));
 }
 
-double Prediction::mean() const {
-  return fixed + legs * scores->mean_factor(inflation * scatter) + halts.mean();
-}
-
 double Prediction::probability_below(double amount, double deviation) const {
   const auto budget_covers = [&](double spent) {
     if (!(deviation > 0)) return spent <= amount ? 1.0 : 0.0;

@@ -35,14 +35,14 @@ struct Prediction {
   double fixed = 0;  // exact
   double legs = 0;
   double spread = 0;
-  double scatter = 0;  // the spread without the correction's error: corrected amounts are means
+  double scatter = 0;  // the spread without the correction's error
   HaltDistribution halts;
   double inflation = 1;
   const ScoreDistribution* scores = nullptr;  // of the Forecaster
 
+  // The sum of the legs' means, as corrected amounts are means.
   double expected() const { return fixed + legs + halts.mean(); }
   double quantile(double probability) const;
-  double mean() const;
   // The probability of at most an amount with a standard deviation (0: exact).
   double probability_below(double amount, double deviation = 0) const;
   // The score of the measured amount: the normal deviate with the probability of staying below it.

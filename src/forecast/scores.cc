@@ -61,12 +61,6 @@ double ScoreDistribution::quantile(double probability) const {
   return std::lerp(atoms_[k], atoms_[k + 1], at - static_cast<double>(k));
 }
 
-double ScoreDistribution::mean_factor(double spread) const {
-  double sum = 0;
-  for (const double z : atoms_) sum += std::exp(spread * z);
-  return sum / static_cast<double>(count);
-}
-
 double ScoreDistribution::probability(double z) const {
   constexpr double beyond = 0.5 / static_cast<double>(count), fade = 0.5;
   if (z <= atoms_.front()) return beyond * std::exp((z - atoms_.front()) / fade);

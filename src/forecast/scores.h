@@ -22,8 +22,6 @@ class ScoreDistribution {
   double probability(double z) const;
   // Of the normal distribution with the same 90 % interval.
   double deviation() const { return (quantile(0.95) - quantile(0.05)) / (2 * 1.6448536269514722); }
-  // Mean of exp(spread * z).
-  double mean_factor(double spread) const;
   std::span<const double, count> atoms() const { return atoms_; }
 
  private:

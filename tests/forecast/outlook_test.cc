@@ -58,7 +58,7 @@ TEST(Prediction, UncertaintyKeepsTheMean) {
     PlanSum sum;
     for (int k = 0; k < 4; ++k) f.extend(sum, drive(500));
     const Prediction p = f.energy(sum);
-    EXPECT_NEAR(p.mean(), 2000 * (1 + 0.5 * (0.01 * 0.01 + 0.02 * 0.02 / 4)), 0.2);
+    EXPECT_NEAR(p.expected(), 2000, 1e-9);
     EXPECT_GT(p.quantile(0.95) - p.quantile(0.05), width);
     width = p.quantile(0.95) - p.quantile(0.05);
   }
@@ -125,9 +125,18 @@ TEST(Outlook, ReportsLegsAndFailure) {
     EXPECT_LE(task.charge[1], task.charge[2]);
     EXPECT_LE(task.energy_j[0], task.energy_j[1]);
   }
-  const double spread = std::hypot(0.03, 0.05 / std::sqrt(5));
-  EXPECT_NEAR(out.mean_j, 1.5 * usable * ScoreDistribution().mean_factor(spread), 1e-6 * usable);
+  EXPECT_NEAR(out.mean_j, 1.5 * usable, 1e-9 * usable);
   EXPECT_EQ(out.probability, out.tasks.back().probability);
+}
+
+TEST(Outlook, LegMeansIgnoreLaterLegs) {
+  const Forecaster f = forecaster(0.03, 0.05);
+  const std::vector<PricedTask> tasks(5, {{drive(500, 100)}, {}});
+  for (std::size_t count = 1; count <= tasks.size(); ++count) {
+    const Outlook out =
+        look_ahead(f, battery(), {0.5, 0, 0.15}, std::span(tasks).first(count), {}, standing_w, 0.95);
+    for (const TaskOutlook& task : out.tasks) EXPECT_NEAR(task.mean_j, 500, 1e-9);
+  }
 }
 
 TEST(Outlook, LatestDepartureKeepsTheConfidence) {
