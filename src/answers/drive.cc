@@ -151,6 +151,7 @@ using WayInput = Part<Way>;
 void read_legs(Fields& fields, Way& way, PathContext& context) {
   const bool drives = fields.member("distances_m") != nullptr, turns = fields.member("turns_rad") != nullptr;
   if (!drives && !turns && !context.may_stand) fields.required("path");
+  way.member = drives ? "distances_m" : turns ? "turns_rad" : way.member;
   std::vector<double> lengths, angles;
   if (drives) lengths = fields.numbers("distances_m", 0, segments_of_path.maximum, straight_length);
   if (turns) angles = fields.numbers("turns_rad", 0, segments_of_path.maximum, turn);
@@ -178,6 +179,7 @@ void read_stations(Fields& fields, Way& way, PathContext& context) {
   const auto towards = [](const planning::Station& to) {
     return planning::Polyline{{{to.x_m, to.y_m}}, to.heading_rad};
   };
+  way.member = "pickup";
   way.path = {towards(*at.pickup),
               planning::Dwell{at.pickup_dwell_s.value_or(0)},
               planning::PayloadChange{payload_kg},

@@ -26,6 +26,7 @@ inline constexpr double most_value_of_time_w = 1e6;
 struct Way {
   std::vector<planning::Segment> path;
   std::optional<planning::Stations> stations = {};  // the path fetches at one and brings to the other
+  std::string_view member = "path";                 // of the request, that gives the path
   bool placed = true;   // false: distances without turns, which end at no known place
   bool former = false;  // given by members of the version before
 

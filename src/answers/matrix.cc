@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -75,6 +76,11 @@ struct ReadLeg {
 };
 
 void make_leg(Fields& fields, ReadLeg& read, PathContext&) {
+  for (std::size_t k = 0; k < read.way.path.size() && fields.ok(); ++k)
+    if (const auto* change = std::get_if<planning::PayloadChange>(&read.way.path[k]))
+      if (change->payload_kg > 0)
+        fields.fault(fmt::format("path/{}/payload_kg", k),
+                     "must be 0: the task's payload_kg is carried from the pick-up to the drop-off");
   if (!fields.ok() || read.way.path.empty()) return;
   Result<planning::Path> path = path_of(read.way, read.options);
   if (path) {
@@ -118,6 +124,8 @@ struct ReadTask {
   bool former = false;
 };
 struct MatrixContext : PathContext {
+  MatrixContext() : PathContext{.payload_limit_kg = std::numeric_limits<double>::infinity()} {}
+
   std::size_t robots = 0;
 };
 

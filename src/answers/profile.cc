@@ -65,6 +65,14 @@ Result<const planning::Planner*> planner_for(const DriveInput& input, const Mode
   return &own.emplace(std::move(made));
 }
 
+// Errors of the way name the member that gives it.
+Result<planning::Plan> planned(const planning::Planner& planner, const DriveInput& input,
+                               const planning::Path& path, const std::stop_token& stop) {
+  auto plan = planner.plan(path, input.problem, stop);
+  if (!plan && plan.error().field == "path") plan.error().field = input.way.member;
+  return plan;
+}
+
 constexpr std::int64_t max_pareto_points = 200;
 
 using described::Table;
@@ -218,7 +226,7 @@ Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, 
   TRY_ASSIGN(const auto path, path_of(input.way, input.options));
   std::optional<planning::Planner> own;
   TRY_ASSIGN(const auto planner, planner_for(input, model, own));
-  return planner->plan(path, input.problem, stop);
+  return planned(*planner, input, path, stop);
 }
 
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
@@ -226,7 +234,7 @@ Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& mod
   TRY_ASSIGN(const auto path, path_of(input.drive.way, input.drive.options));
   std::optional<planning::Planner> own;
   TRY_ASSIGN(const auto planner, planner_for(input.drive, model, own));
-  TRY_ASSIGN(auto plan, planner->plan(path, input.drive.problem, stop));
+  TRY_ASSIGN(auto plan, planned(*planner, input.drive, path, stop));
   return compared(*planner, input, path, std::move(plan), stop);
 }
 

@@ -376,6 +376,7 @@ TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
   far["dropoff"]["x_m"] = 50'000;
   json leg = legs_;
   leg["loaded"]["turns_rad"] = {1, "left"};
+  const json loaded = {{"path", {{{"kind", "payload"}, {"payload_kg", 5}}}}};
   json rows = json::array();
   for (int k = 0; k < 2000; ++k) rows.push_back("a");
   json columns = json::array();
@@ -399,6 +400,7 @@ TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
            {{{"robots", a}, {"tasks", {with(stations_, "dropoff", nullptr)}}}, "/tasks/0/dropoff"},
            {{{"robots", a}, {"tasks", {far}}}, "/tasks/0/dropoff"},
            {{{"robots", a}, {"tasks", {leg}}}, "/tasks/0/loaded/turns_rad/1"},
+           {{{"robots", a}, {"tasks", {with(legs_, "loaded", loaded)}}}, "/tasks/0/loaded/path/0/payload_kg"},
            {{{"robots", a}, {"tasks", {legs_}}, {"regeneration", 1.5}}, "/regeneration"},
            {{{"robots", rows}, {"tasks", columns}}, "/tasks", Fault::too_large},
            {{{"robots", rows}, {"tasks", usual_columns}, {"driving", "usual"}},

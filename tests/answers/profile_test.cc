@@ -358,6 +358,8 @@ TEST(Profile, SpendsAnEnergyBudget) {
   EXPECT_NEAR(again["energy_j"], a["energy_j"].get<double>(), 1e-4 * least_j);
   EXPECT_EQ(fault(profile_answer, {{"distances_m", {1e-300}}}).field, "/distances_m");
   EXPECT_EQ(fault(profile_answer, {{"path", {{{"kind", "turn"}, {"angle_rad", 1e-300}}}}}).field, "path");
+  const json start = {{"x_m", 0}, {"y_m", 0}};
+  EXPECT_EQ(fault(profile_answer, {{"pickup", start}, {"dropoff", start}}).field, "pickup");
   EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 9}, {"deadline_s", 9}}).field,
             "/energy_budget_j");
   EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 0.5 * least_j}}).fault,
