@@ -18,16 +18,18 @@ constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
 
 // Scatter that is assumed before any is observed, and the number of legs or missions that the assumption
-// counts for: root mean squares of what 200 robots of an independent plant and 24 virtual ones of six habits
-// have learned after 30 missions, with equal weights; stated durations are of the 100 that follow plans
-// inexactly (with their common 0.006, intervals after one mission cover 94 and 90 %, with 0.01 97 and 94).
-constexpr std::array<Scatter, subject_count> assumed{{{{0.045, 0.045, 0.055}, 0.015},
-                                                      {{0.05, 0.05, 0.065}, 0.017},
-                                                      {{0.06, 0.075, 0.12}, 0.02},
+// counts for: a scaled inverse chi-squared distribution of variances, by maximum likelihood of what 24 robots
+// of an independent plant and 24 virtual ones of six habits have learned after 30 missions (harmonic means of
+// variances; degrees of freedom are 1 to 5 for legs of stated energies, 2 to 4 for missions). Stated
+// durations are of 100 robots that follow plans inexactly (with their common 0.006, intervals after one
+// mission cover 94 and 90 %, with 0.01 97 and 94).
+constexpr std::array<Scatter, subject_count> assumed{{{{0.031, 0.014, 0.029}, 0.0094},
+                                                      {{0.039, 0.032, 0.047}, 0.0113},
+                                                      {{0.051, 0.054, 0.102}, 0.016},
                                                       {{0.05, 0.02, 0.025}, 0.01},
-                                                      {{0.05, 0.055, 0.05}, 0.011},
-                                                      {{0.05, 0.125, 0.135}, 0.03}}};
-constexpr double assumed_legs = 5, assumed_common_missions = 2;
+                                                      {{0.05, 0.037, 0.04}, 0.0087},
+                                                      {{0.05, 0.08, 0.122}, 0.0174}}};
+constexpr double assumed_legs = 3, assumed_common_missions = 3;
 
 // Estimates from fewer kept missions are repeated, up to so many missions in all.
 constexpr std::int64_t few_missions = 6;
