@@ -120,8 +120,10 @@ Result<std::unique_ptr<Gate>> Gate::open(Options options) {
   if (Result<void> loaded = gate->load(); !loaded) {
     const bool there = ::access(gate->options_.token_file.c_str(), F_OK) == 0;
     return fail(loaded.error().fault, "auth.token_file",
-                describe(loaded.error()) + (there ? "; the daemon's user must be able to read it"
-                                                  : "; joulecast token create makes it"));
+                describe(loaded.error()) + (!there ? "; joulecast token create makes it"
+                                            : loaded.error().fault == Fault::invalid
+                                                ? ""
+                                                : "; the daemon's user must be able to read it"));
   }
   return gate;
 }

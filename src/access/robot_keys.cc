@@ -41,7 +41,7 @@ std::string to_json_text(const RobotKeys& keys) {
 }
 
 Result<RobotKeys> read_robot_keys(const std::string& path) {
-  TRY_ASSIGN(const std::string text, read_private_file(path));
+  TRY_ASSIGN(const std::string text, read_guarded_file(path, true));
   Result<RobotKeys> keys = parse_robot_keys(text);
   if (!keys) return invalid(path, describe(keys.error()));
   return keys;

@@ -10,17 +10,19 @@
 
 namespace joulecast::access {
 
-Result<std::string> read_private_file(const std::string& path, std::size_t max_bytes) {
+Result<std::string> read_guarded_file(const std::string& path, bool secret, std::size_t max_bytes) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
-  if ((status.st_mode & S_IROTH) != 0)
+  if (secret && (status.st_mode & S_IROTH) != 0)
     return invalid(path, "may be read by every user of this machine: chmod o-r");
+  if ((status.st_mode & S_IWOTH) != 0)
+    return invalid(path, "may be written by every user of this machine: chmod o-w");
   return read_text_file(path, max_bytes);
 }
 
 Result<std::string> read_secret(const std::string& path, std::size_t least) {
   constexpr std::size_t most_bytes = 4096;
-  TRY_ASSIGN(std::string text, read_private_file(path, most_bytes));
+  TRY_ASSIGN(std::string text, read_guarded_file(path, true, most_bytes));
   constexpr const char* space = " \t\r\n";
   text.erase(0, text.find_first_not_of(space));
   text.erase(text.find_last_not_of(space) + 1);

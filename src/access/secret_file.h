@@ -13,9 +13,12 @@
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
 
-// The content of a file. Fault::invalid where every user of the machine may read it.
-Result<std::string> read_private_file(const std::string& path, std::size_t max_bytes = max_text_file_bytes);
-// The same without the whitespace around it; Fault::invalid also where fewer than `least` bytes remain.
+// The content of a file. Fault::invalid where every user of the machine may write it or, if it is secret, read
+// it.
+Result<std::string> read_guarded_file(const std::string& path, bool secret,
+                                      std::size_t max_bytes = max_text_file_bytes);
+// That of a secret file without the whitespace around it; Fault::invalid also where fewer than `least` bytes
+// remain.
 Result<std::string> read_secret(const std::string& path, std::size_t least);
 
 // The new file next to the old one, as `<path>.new`, which exists only while it is written.

@@ -100,7 +100,7 @@ std::string to_json_text(const std::vector<Token>& tokens) {
 }
 
 Result<std::vector<Token>> read_tokens(const std::string& path) {
-  TRY_ASSIGN(const std::string text, read_text_file(path));
+  TRY_ASSIGN(const std::string text, read_guarded_file(path, false));
   Result<std::vector<Token>> tokens = parse_tokens(text);
   if (!tokens) return invalid(path, describe(tokens.error()));
   return tokens;

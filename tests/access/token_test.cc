@@ -88,6 +88,12 @@ TEST_F(TokenFileTest, KeepsHashesAndNoSecrets) {
   EXPECT_EQ(status.st_mode & 0777, 0640U);
 }
 
+TEST_F(TokenFileTest, RejectsFileWritableByAll) {
+  ASSERT_TRUE(add({.name = "a", .sha256 = sha256_hex("a")}));
+  ASSERT_EQ(chmod(path_.c_str(), 0666), 0);
+  EXPECT_EQ(read_tokens(path_).error().message, "may be written by every user of this machine: chmod o-w");
+}
+
 TEST_F(TokenFileTest, FailedChangeKeepsFile) {
   ASSERT_TRUE(add({.name = "a", .sha256 = sha256_hex("a")}));
   const auto refused = change_tokens(path_, [](std::vector<Token>& tokens) -> Result<void> {
