@@ -186,9 +186,11 @@ Result<StoreCheck> check_store(const std::string& path) {
 Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy) {
   TRY_ASSIGN(auto file, new_file(copy));
   TRY_ASSIGN(auto database, open_file(path, OpenMode::read_write_create));
-  TRY(copy_into(*database, file.written_to()));
-  TRY_ASSIGN(auto check, check_store(file.written_to()));
+  // A damaged store may fail to be copied with another error, such as a full disk.
+  const Result<void> copied = copy_into(*database, file.written_to());
+  TRY_ASSIGN(auto check, check_store(copied ? file.written_to() : path));
   if (!check.faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check.faults.front());
+  TRY(copied);
   TRY(file.commit());
   return check;
 }

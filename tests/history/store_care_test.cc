@@ -64,6 +64,15 @@ class StoreCare : public ::testing::Test {
     return value;
   }
 
+  // The beginning of the page of the first such text in the file.
+  void overwrite_page(const std::string& text, const std::string& with) {
+    const std::size_t at = need(read_text_file(path_)).find(text);
+    ASSERT_NE(at, std::string::npos);
+    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(static_cast<std::streamoff>(at / 4096 * 4096));
+    file << with;
+  }
+
   // As much of it as is surely on one page.
   std::string body_of_chunk(int key) {
     sqlite3* database = nullptr;
@@ -164,20 +173,25 @@ TEST_F(StoreCare, RootRestoresForTheDaemonsUser) {
   EXPECT_EQ(owner_of(folder_.file("new.db")), daemon) << "as its directory";
 }
 
+// SQLite reports a full disk where a page refers to one beyond its largest file.
+TEST_F(StoreCare, RejectsBackupOfBrokenChain) {
+  const std::string model = R"({"a": ")" + std::string(20'000, 'x') + "\"}";
+  need(apply_one(*store_, AddModel{"amr-1", 5, ModelOrigin::http, "", model, {}}));
+  store_.reset();
+  write("PRAGMA wal_checkpoint(TRUNCATE)");
+  overwrite_page(std::string(4000, 'x'), "\xa5\xa5\xa5\xa5");
+  const Error error = back_up_store(path_, folder_.file("copy.db")).error();
+  EXPECT_EQ(error.fault, Fault::corrupt) << describe(error);
+  EXPECT_EQ(error.field, path_);
+}
+
 TEST_F(StoreCare, SalvagesUndamagedPages) {
   fill(60);
   fill(2, "amr-2");
   store_.reset();
   write("PRAGMA wal_checkpoint(TRUNCATE)");
   // The page that holds a chunk of telemetry.
-  const std::string bytes = need(read_text_file(path_)), body = body_of_chunk(30);
-  const std::size_t at = bytes.find(body);
-  ASSERT_NE(at, std::string::npos);
-  {
-    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
-    file.seekp(static_cast<std::streamoff>(at / 4096 * 4096));
-    file << std::string(4096, '\xa5');
-  }
+  overwrite_page(body_of_chunk(30), std::string(4096, '\xa5'));
   const auto check = need(check_store(path_));
   EXPECT_FALSE(check.faults.empty());
   const std::string copy = folder_.file("copy.db"), whole = folder_.file("whole.db");
