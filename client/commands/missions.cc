@@ -21,30 +21,25 @@ struct MissionsOptions {
   bool json = false;
 };
 
-std::string state_of(const Json& mission) {
-  if (!mission.value("annulled", Json()).is_null()) return "annulled";
-  return text_of(mission["state"]) + (mission.value("incomplete", false) ? "*" : "");
-}
-
-void print_missions(const Json& page, const std::string& unit) {
-  print_rows(member_at(page, "missions"),
-             {{"id", "id", 0},
-              {"robot", "robot_id"},
-              {"mission", "mission_id"},
-              text_column("state", state_of),
-              time_column("start (UTC)", "start"),
-              {"time s", "energy/duration_s", 2},
-              {"driven m", "energy/distance_m", 2},
-              energy_column("battery", "energy/battery_j", unit),
-              energy_column("modelled", "energy/modelled_j", unit)},
-             "no mission matches");
+void print_page(const Json& page, const std::string& unit) {
+  print_missions(member_at(page, "missions"),
+                 {{"id", "id", 0},
+                  {"robot", "robot_id"},
+                  {"mission", "mission_id"},
+                  {"state", "state"},
+                  time_column("start (UTC)", "start"),
+                  {"time s", "energy/duration_s", 2},
+                  {"driven m", "energy/distance_m", 2},
+                  energy_column("battery", "energy/battery_j", unit),
+                  energy_column("modelled", "energy/modelled_j", unit)},
+                 "no mission matches");
   if (const Json& next = member_at(page, "next_cursor"); next.is_string())
     fmt::print("more: --cursor {}\n", text_of(next));
 }
 
 Result<Exit> run_missions(MissionsOptions& options) {
   return show(options.server, target_of("/v1/missions", query_of(options.given)), renamed_by(options.given),
-              options.json, [&](const Json& page) { print_missions(page, options.unit); });
+              options.json, [&](const Json& page) { print_page(page, options.unit); });
 }
 
 struct LedgerOptions {

@@ -272,6 +272,22 @@ Column energy_column(const std::string& title, const std::string& member_j, cons
           }};
 }
 
+void print_missions(Json missions, const std::vector<Column>& columns, const char* none) {
+  bool partly = false;
+  for (Json& mission : missions) {
+    Json& state = mission["state"];
+    if (mission.value("incomplete", false)) state = text_of(state) + "*";
+    const Json& energy = mission["energy"];
+    if (number_at(energy, "measured_s") < number_at(energy, "duration_s")) {
+      state = text_of(state) + "~";
+      partly = true;
+    }
+    if (!mission.value("annulled", Json()).is_null()) state = "annulled";
+  }
+  print_rows(missions, columns, none);
+  if (partly) fmt::print("~ = battery power was measured for a part of the time, or never\n");
+}
+
 void print_ledger_terms(const Json& terms_j, double whole_j, const std::string& unit) {
   for (const auto& [term, joules] : terms_j.items()) {
     const double value_j = effect_on_sum(term, number_or_nan(joules));

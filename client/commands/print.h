@@ -61,6 +61,10 @@ inline const std::vector<std::string> energy_units{"Wh", "J"};
 [[nodiscard]] Column energy_column(const std::string& title, const std::string& member_j,
                                    const std::string& unit);
 
+// Prints missions as a table with their state in a column: "finished*" of an incomplete one, "finished~" of
+// one with battery power that was not measured all the time.
+void print_missions(Json missions, const std::vector<Column>& columns, const char* none = nullptr);
+
 // The change of the sum by a term of a ledger: recovered energy is stated positive and subtracted.
 inline double effect_on_sum(std::string_view term, double joules) {
   return term == "recovered" ? -joules : joules;

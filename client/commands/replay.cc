@@ -131,18 +131,14 @@ std::string replayed_json(const std::vector<history::Mission>& missions, const t
 }
 
 void print_replayed(const Json& document, const std::string& unit, double wall_s) {
-  print_rows(document["missions"], {{"robot", "robot_id"},
-                                    {"mission", "mission_id"},
-                                    text_column("state",
-                                                [](const Json& m) {
-                                                  return text_of(m["state"]) +
-                                                         (m.value("incomplete", false) ? "*" : "");
-                                                }),
-                                    {"time s", "energy/duration_s", 1},
-                                    {"driven m", "energy/distance_m", 1},
-                                    energy_column("measured", "energy/measured_j", unit),
-                                    energy_column("modelled", "energy/modelled_j", unit),
-                                    energy_column("unexplained", "energy/unexplained_j", unit)});
+  print_missions(document["missions"], {{"robot", "robot_id"},
+                                        {"mission", "mission_id"},
+                                        {"state", "state"},
+                                        {"time s", "energy/duration_s", 1},
+                                        {"driven m", "energy/distance_m", 1},
+                                        energy_column("measured", "energy/measured_j", unit),
+                                        energy_column("modelled", "energy/modelled_j", unit),
+                                        energy_column("unexplained", "energy/unexplained_j", unit)});
   const double messages = number_at(document, "messages");
   fmt::print("{:.0f} messages in {:.2f} s ({:.0f} a second); * = incomplete\n", messages, wall_s,
              messages / std::max(wall_s, 1e-9));

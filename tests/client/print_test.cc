@@ -35,6 +35,22 @@ TEST(PrintRows, ReportsEmptyTable) {
   EXPECT_EQ(output_of([] { print_rows(Json(), {{"name", "name"}}, "no robot"); }), "name\nno robot\n");
 }
 
+TEST(PrintMissions, MarkPartlyMeasured) {
+  const auto mission = [](double measured_s, bool incomplete, const Json& annulled) {
+    return Json{{"state", "finished"},
+                {"incomplete", incomplete},
+                {"annulled", annulled},
+                {"energy", {{"measured_s", measured_s}, {"duration_s", 300}}}};
+  };
+  const auto printed = [](const Json& missions) {
+    return output_of([&] { print_missions(missions, {{"state", "state"}}); });
+  };
+  EXPECT_EQ(printed({mission(300, false, {}), mission(300, true, {})}), "state\nfinished\nfinished*\n");
+  EXPECT_EQ(printed({mission(260, true, {}), mission(0, false, {}), mission(0, false, "sensor")}),
+            "state\nfinished*~\nfinished~\nannulled\n"
+            "~ = battery power was measured for a part of the time, or never\n");
+}
+
 TEST(NumberText, DropsSignOfZero) {
   EXPECT_EQ(number_text(-0.04, 1), "0.0");
   EXPECT_EQ(number_text(-0.06, 1), "-0.1");
