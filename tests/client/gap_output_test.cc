@@ -53,6 +53,15 @@ TEST(GapOutput, OmitsProbabilityOfUndecidedVerdict) {
   }
 }
 
+// The errors of the robot file in a comparison of groups are those with these effects.
+TEST(GapOutput, NamesCommonEffectsFirst) {
+  json d = gap::diagnosis_to_json(made_diagnosis());
+  d["common"] = {"accessory_load"};
+  const std::string text = printed(d);
+  EXPECT_LT(text.find("robot file below: with the effects common to all groups: accessory_load\n"),
+            text.find("gap: "));
+}
+
 TEST(GapOutput, PrintsSectionsInOrder) {
   const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
   std::size_t at = 0;
