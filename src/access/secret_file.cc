@@ -12,7 +12,8 @@ namespace joulecast::access {
 
 Result<std::string> read_guarded_file(const std::string& path, bool secret, std::size_t max_bytes) {
   struct stat status {};
-  if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
+  if (stat(path.c_str(), &status) != 0)
+    return fail(errno == ENOENT ? Fault::not_found : Fault::unavailable, path, std::strerror(errno));
   if (secret && (status.st_mode & S_IROTH) != 0)
     return invalid(path, "may be read by every user of this machine: chmod o-r");
   if ((status.st_mode & S_IWOTH) != 0)
