@@ -226,11 +226,9 @@ struct Application::Parts {
   }
 
   Result<void> open_webhooks() {
-    const std::string& file = options.webhooks_file;
-    if (file.empty()) return {};
-    Result<std::vector<server::Webhook>> read = server::read_webhooks(file);
-    if (!read) return fail(read.error().fault, "webhooks.file", describe(read.error()));
-    webhooks = std::make_unique<server::Webhooks>(std::move(*read), options.webhooks);
+    if (options.webhooks_file.empty()) return {};
+    TRY_ASSIGN(auto read, server::read_webhooks(options.webhooks_file));
+    webhooks = std::make_unique<server::Webhooks>(std::move(read), options.webhooks);
     server::export_webhook_metrics(metrics, *webhooks);
     return {};
   }

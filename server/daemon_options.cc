@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <boost/asio/ssl/context.hpp>
 #include <utility>
 
 #include "access/secret_file.h"
@@ -13,6 +15,7 @@
 #include "server/http/admission.h"
 #include "server/http/delivery.h"
 #include "server/http/gate.h"
+#include "server/http/static_files.h"
 #include "telemetry/datagram_socket.h"
 #include "telemetry/lcm_link.h"
 
@@ -87,11 +90,21 @@ Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options
     if (!password) return invalid("mqtt.password_file", describe(password.error()));
     mqtt.broker.password = std::move(*password);
   }
+  if (const std::string& file = mqtt.broker.authorities; !file.empty()) {
+    boost::system::error_code error;
+    boost::asio::ssl::context(boost::asio::ssl::context::tls_client).load_verify_file(file, error);
+    if (error) return invalid("mqtt.authorities", "cannot use " + file + ": " + error.message());
+  }
   return mqtt;
 }
 
 Result<void> check_exposure(const DaemonOptions& options) {
   for (const std::string& origin : options.http.allowed_origins) TRY(http::check_origin(origin));
+  for (const std::string& host : options.http.allowed_hosts) {
+    if (host != "*" && (host.find_first_of("/*") != std::string::npos || std::ranges::count(host, ':') == 1))
+      return invalid("http.allowed_hosts",
+                     "has " + host + ", must be names such as fleet.example, without scheme and port, or *");
+  }
   const std::string& address = options.http.address;
   TRY_ASSIGN(const auto listening, http::address_of(address, "http.address"));
   if (listening.is_loopback()) return {};
@@ -130,6 +143,7 @@ std::vector<Error> faults_of(const DaemonOptions& options) {
   check(telemetry::check_lcm_url(options.ingest.lcm_url));
   check(telemetry::parse_interface(options.ingest.listen.interface_address));
   check(telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from));
+  if (!options.web_directory.empty()) check(http::asset_endpoints_from(options.web_directory));
   if (!options.webhooks_file.empty()) check(server::read_webhooks(options.webhooks_file));
   if (!options.mqtt_url.empty()) check(mqtt_options(options));
   if (options.robots_directory.empty()) return faults;

@@ -68,8 +68,8 @@ std::string spool_path(const DaemonOptions& options);
 // The options of parts whose settings depend on each other. Fault::invalid on "cluster.name" or
 // "cluster.node". An empty name: no cluster.
 Result<server::ClusterOptions> cluster_options(const DaemonOptions& options);
-// Fault::invalid on "mqtt.url", "mqtt.client_id", "mqtt.interface", "mqtt.manufacturer" or
-// "mqtt.password_file".
+// Fault::invalid on "mqtt.url", "mqtt.client_id", "mqtt.interface", "mqtt.manufacturer",
+// "mqtt.password_file" or "mqtt.authorities".
 Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options);
 
 // All errors in the values of the settings that can be detected without opening the store or connecting to a
@@ -78,7 +78,8 @@ Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options
 std::vector<Error> faults_of(const DaemonOptions& options);
 
 // Without tokens only loopback addresses are permitted, unless http.insecure is set. Fault::invalid on
-// "http.address" or "http.allowed_origins"; unsafe settings that are permitted are logged.
+// "http.address", "http.allowed_origins" or "http.allowed_hosts"; unsafe settings that are permitted are
+// logged.
 Result<void> check_exposure(const DaemonOptions& options);
 
 }  // namespace joulecast

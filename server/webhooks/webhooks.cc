@@ -217,9 +217,10 @@ std::string webhook_signature(std::string_view secret, std::int64_t seconds, std
 }
 
 Result<std::vector<Webhook>> read_webhooks(const std::string& path) {
-  TRY_ASSIGN(const auto text, read_text_file(path));
-  Result<std::vector<Webhook>> webhooks = parse(text, std::filesystem::path(path).parent_path());
-  if (!webhooks) return invalid(path, describe(webhooks.error()));
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return fail(text.error().fault, "webhooks.file", describe(text.error()));
+  Result<std::vector<Webhook>> webhooks = parse(*text, std::filesystem::path(path).parent_path());
+  if (!webhooks) return invalid("webhooks.file", path + ": " + describe(webhooks.error()));
   return webhooks;
 }
 

@@ -25,8 +25,8 @@ struct Webhook {
 
 // {"webhooks": [{"url": "https://...", "secret_file": "path", "events": ["mission", ...]}]}. A relative
 // secret_file is relative to the file's folder; it contains at least 16 bytes, not counting surrounding
-// whitespace, and must not be readable by other users. "events" may be left out: all kinds. Faults name the
-// JSON pointer.
+// whitespace, and must not be readable by other users. "events" may be left out: all kinds. Faults are on
+// "webhooks.file" and contain the JSON pointer.
 Result<std::vector<Webhook>> read_webhooks(const std::string& path);
 
 // Every kind that there is, in order of the alphabet: those of the event log and "mission", a mission that

@@ -212,5 +212,23 @@ TEST(CheckConfig, ReportsUnusableAddresses) {
     EXPECT_EQ(std::ranges::count(fields, field), 1) << field;
 }
 
+TEST(CheckConfig, ReportsUnusableFilesAndHosts) {
+  for (const char* host : {"https://fleet.example", "fleet.example:8443", "*.example"}) {
+    DaemonOptions options;
+    options.http.allowed_hosts = {"*", "::1", host};
+    options.web_directory = options.webhooks_file = options.mqtt.broker.authorities = "/nonexistent";
+    options.mqtt_url = "mqtts://broker";
+    std::vector<std::string> fields;
+    for (const Error& fault : faults_of(options)) {
+      fields.push_back(fault.field);
+      EXPECT_NE(fault.message.find(fault.field == "http.allowed_hosts" ? host : "/nonexistent"),
+                std::string::npos)
+          << fault.message;
+    }
+    EXPECT_EQ(fields, (std::vector<std::string>{"http.allowed_hosts", "http.web_directory", "webhooks.file",
+                                                "mqtt.authorities"}));
+  }
+}
+
 }  // namespace
 }  // namespace joulecast
