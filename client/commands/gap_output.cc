@@ -286,6 +286,7 @@ void print_comparison(const Json& d, const std::string& unit) {
       fmt::print(", {} by {}", signed_per_way(by["by_effect_j"][text(e["id"])], unit), text(e["id"]));
     fmt::print(", {} unexplained\n", signed_per_way(by["unexplained_j"], unit));
   }
+  fmt::print("effects common to all groups:{}\n", names_in(d["common"]));
   print_limits(d);
 }
 
@@ -299,7 +300,7 @@ void print_diagnosis(const Json& d, const std::string& unit) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   if (d.contains("common"))
-    fmt::print("robot file below: with the effects common to all groups:{}\n", names_in(d["common"]));
+    fmt::print("gap and errors of the robot file: after a fit of all that the groups have in common\n");
   print_gap(d);
   // The other verdicts have no probability of their own.
   const bool own_probability = d["verdict"] != "inconclusive" && d["verdict"] != "not_this_robot";

@@ -285,7 +285,7 @@ void print_missions(Json missions, const std::vector<Column>& columns, const cha
     if (!mission.value("annulled", Json()).is_null()) state = "annulled";
   }
   print_rows(missions, columns, none);
-  if (partly) fmt::print("~ = battery power was measured for a part of the time, or never\n");
+  if (partly) fmt::print("~ = battery power was measured for only a part of the time, or not at all\n");
 }
 
 void print_ledger_terms(const Json& terms_j, double whole_j, const std::string& unit) {

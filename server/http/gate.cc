@@ -1,6 +1,5 @@
 #include "server/http/gate.h"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -116,7 +115,7 @@ Response unauthorized(const Request& request, bool presented, std::string_view d
 Result<std::unique_ptr<Gate>> Gate::open(Options options) {
   auto gate = std::unique_ptr<Gate>(new Gate(std::move(options)));
   if (!gate->enabled()) return gate;
-  gate->stamp_ = gate->stamp();
+  gate->stamp_ = access::stamp_of(gate->options_.token_file);
   if (Result<void> loaded = gate->load(); !loaded) {
     const bool there = ::access(gate->options_.token_file.c_str(), F_OK) == 0;
     return fail(loaded.error().fault, "auth.token_file",
@@ -126,13 +125,6 @@ Result<std::unique_ptr<Gate>> Gate::open(Options options) {
                                                 : "; the daemon's user must be able to read it"));
   }
   return gate;
-}
-
-Gate::Stamp Gate::stamp() const {
-  struct stat now {};
-  if (stat(options_.token_file.c_str(), &now) != 0) return {};
-  return {std::int64_t{now.st_mtim.tv_sec} * 1'000'000'000 + now.st_mtim.tv_nsec, std::int64_t{now.st_size},
-          now.st_ino};
 }
 
 // With the mutex locked, or before other threads exist.
@@ -152,7 +144,7 @@ Result<void> Gate::load() {
 void Gate::refresh() {
   if (!enabled()) return;
   const std::lock_guard lock(mutex_);
-  const Stamp now = stamp();
+  const access::FileStamp now = access::stamp_of(options_.token_file);
   if (now == stamp_) return;
   stamp_ = now;
   file_ = load();

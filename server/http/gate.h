@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "access/secret_file.h"
 #include "access/token.h"
 #include "describe/schema.h"
 #include "server/http/router.h"
@@ -64,11 +65,6 @@ class Gate {
   Result<void> check() const;
 
  private:
-  struct Stamp {
-    std::int64_t modified_ns = 0, size = 0;
-    std::uint64_t inode = 0;
-    friend bool operator==(const Stamp&, const Stamp&) = default;
-  };
   struct Session {
     std::string token_sha256;
     std::int64_t expires_utime_us = 0;
@@ -76,7 +72,6 @@ class Gate {
 
   explicit Gate(Options options) : options_(std::move(options)) {}
   bool enabled() const { return !options_.token_file.empty(); }
-  Stamp stamp() const;
   Result<void> load();
   const access::Token* token_of(const Request& request, bool& presented);
   std::optional<std::string> why_not(const access::Token& token, const Endpoint& endpoint,
@@ -92,7 +87,7 @@ class Gate {
   const Options options_;
   mutable std::mutex mutex_;
   std::vector<access::Token> tokens_;
-  Stamp stamp_;
+  access::FileStamp stamp_;
   Result<void> file_;                                 // why the file in its present form is not in force
   std::map<std::string, Session> sessions_;           // by the hash of the cookie's value
   std::int64_t minute_ = 0;                           // since 1970

@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "access/secret_file.h"
 #include "server/http/stream_session.h"
 
 namespace joulecast::http {
@@ -39,7 +40,9 @@ Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files) {
   };
   context->use_certificate_chain_file(files.certificate, error);
   if (error) return unusable("http.tls_certificate", files.certificate);
-  context->use_private_key_file(files.key, net::ssl::context::pem, error);
+  const Result<std::string> key = access::read_guarded_file(files.key, true);
+  if (!key) return invalid("http.tls_key", "cannot use " + describe(key.error()));
+  context->use_private_key(net::buffer(*key), net::ssl::context::pem, error);
   if (error) return unusable("http.tls_key", files.key);
   if (files.client_authorities.empty()) return context;
   context->load_verify_file(files.client_authorities, error);

@@ -11,14 +11,14 @@
 namespace joulecast::access {
 
 Result<std::string> read_guarded_file(const std::string& path, bool secret, std::size_t max_bytes) {
+  TRY_ASSIGN(std::string text, read_text_file(path, max_bytes));
   struct stat status {};
-  if (stat(path.c_str(), &status) != 0)
-    return fail(errno == ENOENT ? Fault::not_found : Fault::unavailable, path, std::strerror(errno));
+  if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
   if (secret && (status.st_mode & S_IROTH) != 0)
     return invalid(path, "may be read by every user of this machine: chmod o-r");
   if ((status.st_mode & S_IWOTH) != 0)
     return invalid(path, "may be written by every user of this machine: chmod o-w");
-  return read_text_file(path, max_bytes);
+  return text;
 }
 
 Result<std::string> read_secret(const std::string& path, std::size_t least) {
@@ -29,6 +29,13 @@ Result<std::string> read_secret(const std::string& path, std::size_t least) {
   text.erase(text.find_last_not_of(space) + 1);
   if (text.size() < least) return invalid(path, "must hold " + std::to_string(least) + " bytes at least");
   return text;
+}
+
+FileStamp stamp_of(const std::string& path) {
+  struct stat now {};
+  if (stat(path.c_str(), &now) != 0) return {};
+  return {std::int64_t{now.st_ctim.tv_sec} * 1'000'000'000 + now.st_ctim.tv_nsec, std::int64_t{now.st_size},
+          now.st_ino};
 }
 
 FileReplacement::~FileReplacement() {

@@ -13,13 +13,21 @@
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
 
-// The content of a file. Fault::invalid where every user of the machine may write it or, if it is secret, read
-// it.
+// The content of a file. Fault::invalid where every user of the machine may write it or, if it is secret,
+// read it.
 Result<std::string> read_guarded_file(const std::string& path, bool secret,
                                       std::size_t max_bytes = max_text_file_bytes);
 // That of a secret file without the whitespace around it; Fault::invalid also where fewer than `least` bytes
 // remain.
 Result<std::string> read_secret(const std::string& path, std::size_t least);
+
+// Changes with a file's content, permissions and replacement.
+struct FileStamp {
+  std::int64_t changed_ns = 0, size = 0;
+  std::uint64_t inode = 0;
+  friend bool operator==(const FileStamp&, const FileStamp&) = default;
+};
+FileStamp stamp_of(const std::string& path);
 
 // The new file next to the old one, as `<path>.new`, which exists only while it is written.
 class FileReplacement : boost::noncopyable {

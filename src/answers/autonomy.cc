@@ -314,7 +314,7 @@ const Table<TaskOutlook>& stage_table() {
   static const auto table =
       Table<S>()
           .number_or_null("expected_energy_j", &S::mean_j,
-                          "mean energy of this leg; independent of later ones")
+                          "mean energy of this leg; the legs add up to the whole")
           .number_or_null("ends_after_s", &S::duration_s, "expected time from now to its end")
           .number_or_null("success_probability", &S::probability,
                           "probability that the reserve is not used until its end")

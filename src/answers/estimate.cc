@@ -229,7 +229,7 @@ const Table<EstimateAnswer>& estimate_table() {
               },
               std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
           .value("energy_j", AT(output.accounts.battery_j),
-                 "from the battery; of usual driving the mean of its forecast")
+                 "from the battery; of usual driving the mean, the sum over the legs")
           .value("duration_s", AT(output.accounts.duration_s), "from start to end")
           .value("distance_m", AT(output.accounts.distance_m),
                  "driven distance, forward and backward both positive")

@@ -222,10 +222,11 @@ const Table<MatrixRow>& row_table() {
           .texts("neglected_effects", &R::neglected_effects,
                  "adopted effects that depend on the position on the floor, which are not included in these "
                  "costs")
-          .column("energy_j", &R::energy_j,
-                  "energy from the battery, dwells included; for usual driving the mean of its forecast; "
-                  "null where infeasible",
-                  places, true)
+          .column(
+              "energy_j", &R::energy_j,
+              "energy from the battery, dwells included; for usual driving the mean, the sum over the legs; "
+              "null where infeasible",
+              places, true)
           .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
           .column("success_probability", &R::success_probability,
                   "probability that the robot ends this task alone, in the requested driving model, with at "

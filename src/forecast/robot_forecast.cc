@@ -18,11 +18,10 @@ constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
 
 // Scatter that is assumed before any is observed, and the number of legs or missions that the assumption
-// counts for: a scaled inverse chi-squared distribution of variances, by maximum likelihood of what 24 robots
-// of an independent plant and 24 virtual ones of six habits have learned after 30 missions (harmonic means of
-// variances; degrees of freedom are 1 to 5 for legs of stated energies, 2 to 4 for missions). Stated
-// durations are of 100 robots that follow plans inexactly (with their common 0.006, intervals after one
-// mission cover 94 and 90 %, with 0.01 97 and 94).
+// counts for: a scaled inverse chi-squared distribution of variances, fitted by maximum likelihood to what 24
+// robots of an independent plant and 24 virtual ones of six habits have learned after 30 missions (harmonic
+// means of variances; degrees of freedom are 1 to 5 for legs of stated energies, 2 to 4 for missions). Stated
+// durations are root mean squares of 100 robots that follow plans inexactly.
 constexpr std::array<Scatter, subject_count> assumed{{{{0.031, 0.014, 0.029}, 0.0094},
                                                       {{0.039, 0.032, 0.047}, 0.0113},
                                                       {{0.051, 0.054, 0.102}, 0.016},

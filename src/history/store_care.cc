@@ -188,9 +188,11 @@ Result<StoreCheck> back_up_store(const std::string& path, const std::string& cop
   TRY_ASSIGN(auto database, open_file(path, OpenMode::read_write_create));
   // A damaged store may fail to be copied with another error, such as a full disk.
   const Result<void> copied = copy_into(*database, file.written_to());
-  TRY_ASSIGN(auto check, check_store(copied ? file.written_to() : path));
-  if (!check.faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check.faults.front());
+  auto check = check_store(copied ? file.written_to() : path);
+  if (check && !check->faults.empty())
+    return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
   TRY(copied);
+  TRY(check);
   TRY(file.commit());
   return check;
 }

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <system_error>
-
 #include "telemetry/codec.h"
 
 namespace joulecast::ingest {
@@ -28,8 +26,7 @@ Result<void> SignatureGate::read_keys() {
     if (options_.required) return invalid("ingest.require_signed", "needs an ingest.key_file");
     return {};
   }
-  std::error_code ignored;
-  changed_ = std::filesystem::last_write_time(options_.key_file, ignored);
+  stamp_ = access::stamp_of(options_.key_file);
   Result<access::RobotKeys> keys = access::read_robot_keys(options_.key_file);
   if (!keys) return fail(keys.error().fault, "ingest.key_file", describe(keys.error()));
   keys_ = std::move(*keys);
@@ -41,8 +38,7 @@ std::optional<Result<void>> SignatureGate::refresh() {
   const auto now = std::chrono::steady_clock::now();
   if (now - looked_ < std::chrono::seconds(1)) return std::nullopt;
   looked_ = now;
-  std::error_code ignored;
-  if (std::filesystem::last_write_time(options_.key_file, ignored) == changed_) return std::nullopt;
+  if (access::stamp_of(options_.key_file) == stamp_) return std::nullopt;
   return read_keys();
 }
 

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "access/robot_keys.h"
+#include "access/secret_file.h"
 #include "base/error.h"
 #include "ingest/inbound_message.h"
 
@@ -53,7 +53,7 @@ class SignatureGate {
 
   SignatureOptions options_;
   access::RobotKeys keys_;
-  std::filesystem::file_time_type changed_;
+  access::FileStamp stamp_;
   std::chrono::steady_clock::time_point looked_;
   std::map<std::string, std::pair<std::string, Window>, std::less<>> windows_;  // of channels, each of a key
 };

@@ -53,13 +53,15 @@ TEST(GapOutput, OmitsProbabilityOfUndecidedVerdict) {
   }
 }
 
-// The errors of the robot file in a comparison of groups are those with these effects.
-TEST(GapOutput, NamesCommonEffectsFirst) {
+// The gap of a comparison is that of the differences alone.
+TEST(GapOutput, StatesCommonFitFirst) {
   json d = gap::diagnosis_to_json(made_diagnosis());
+  EXPECT_THAT(printed(d), Not(HasSubstr("in common")));
   d["common"] = {"accessory_load"};
   const std::string text = printed(d);
-  EXPECT_LT(text.find("robot file below: with the effects common to all groups: accessory_load\n"),
-            text.find("gap: "));
+  EXPECT_LT(
+      text.find("gap and errors of the robot file: after a fit of all that the groups have in common\n"),
+      text.find("gap: "));
 }
 
 TEST(GapOutput, PrintsSectionsInOrder) {
