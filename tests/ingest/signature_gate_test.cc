@@ -1,6 +1,7 @@
 #include "ingest/signature_gate.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
@@ -93,9 +94,7 @@ TEST_F(SignatureGateTest, RequiredSigningRejectsKeylessRobots) {
 TEST_F(SignatureGateTest, ReadsChangedFilesOnly) {
   SignatureGate g = gate();
   const auto change = [&](const std::string& text) {
-    const auto before = std::filesystem::last_write_time(path_);
     ASSERT_TRUE(write_text_file(path_, text, Existing::replace));
-    std::filesystem::last_write_time(path_, before + std::chrono::seconds(2));
     usleep(1'100'000);
   };
   change("no keys");
@@ -105,6 +104,11 @@ TEST_F(SignatureGateTest, ReadsChangedFilesOnly) {
   EXPECT_TRUE(*g.refresh());
   EXPECT_EQ(fate(g, signed_with(gate_key, 2)), "bad_signature");
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'n'), 3)), "passes");
+  for (const auto& [mode, is_read] : {std::pair{0602U, false}, {0600U, true}}) {
+    ASSERT_EQ(chmod(path_.c_str(), mode), 0);
+    usleep(1'100'000);
+    EXPECT_EQ(g.refresh()->has_value(), is_read);
+  }
 }
 
 TEST_F(SignatureGateTest, ChangedKeyBeginsNewWindow) {
