@@ -16,9 +16,10 @@ void keep_last(double& kept, double value) {
 }  // namespace
 
 void BucketSum::Sum::add(const Band& band, double weight_s) {
-  if (!std::isfinite(band.mean)) return;
-  weighted += weight_s * band.mean;
-  weight += weight_s;
+  if (std::isfinite(band.mean)) {
+    weighted += weight_s * band.mean;
+    weight += weight_s;
+  }
   // fmin and fmax pass over NaN.
   min = std::fmin(min, band.min);
   max = std::fmax(max, band.max);

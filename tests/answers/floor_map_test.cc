@@ -28,7 +28,7 @@ struct Fleet {
         for (std::int32_t row = 0; row < 8; ++row) {
           const double modelled_j = 80 + 40 * std::fabs(noise(random));
           const double measured_j = modelled_j * (ratio(column, row) + noise(random));
-          visits.push_back({{4, 2, measured_j, measured_j, modelled_j, measured_j}, column, row});
+          visits.push_back({{4, 2, measured_j, measured_j, measured_j, modelled_j}, column, row});
         }
       EXPECT_TRUE(mapper.add(FloorMission{++missions, robot, visits}));
     }
@@ -129,7 +129,7 @@ TEST(FloorMap, SeparatesExcessAndDeficitZones) {
 
 TEST(FloorMap, StandingHasNoEnergyPerMetre) {
   FloorMapper mapper(1);
-  const std::vector<FloorVisit> visits{{{100, 0.2, 2000, 0, 0, 20}, 0, 0}, {{2, 1.1, 90, 0, 0, 90}, 1, 0}};
+  const std::vector<FloorVisit> visits{{{100, 0.2, 2000, 20, 0, 0}, 0, 0}, {{2, 1.1, 90, 90, 0, 0}, 1, 0}};
   EXPECT_TRUE(mapper.add(FloorMission{1, "a", visits}));
   const FloorMap map = *mapper.finish({1, 1, 102});
   ASSERT_EQ(map.cells.size(), 2u);
@@ -142,7 +142,7 @@ TEST(FloorMap, RejectsTooManySquares) {
   FloorMapper mapper(0.1);
   std::vector<FloorVisit> visits;
   for (std::int32_t k = 0; k <= static_cast<std::int32_t>(most_floor_cells); ++k)
-    visits.push_back({{1, 1, 1, 1, 1}, k, 0});
+    visits.push_back({{1, 1, 1, 0, 1, 1}, k, 0});
   EXPECT_FALSE(mapper.add(FloorMission{1, "a", visits}));
   const auto map = mapper.finish({});
   ASSERT_FALSE(map);

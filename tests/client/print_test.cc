@@ -48,7 +48,7 @@ TEST(PrintMissions, MarkPartlyMeasured) {
   EXPECT_EQ(printed({mission(300, false, {}), mission(300, true, {})}), "state\nfinished\nfinished*\n");
   EXPECT_EQ(printed({mission(260, true, {}), mission(0, false, {}), mission(0, false, "sensor")}),
             "state\nfinished*~\nfinished~\nannulled\n"
-            "~ = battery power was measured for a part of the time, or never\n");
+            "~ = battery power was measured for only a part of the time, or not at all\n");
 }
 
 TEST(NumberText, DropsSignOfZero) {
