@@ -44,10 +44,9 @@ constexpr AttentionKind kinds[] = {{"contradicted", "", "contradiction_ended"},
                                    {"store"},
                                    {"cluster"}};
 
-void order(std::vector<AttentionReason>& reasons) {
-  std::ranges::stable_sort(reasons, {}, [](const AttentionReason& r) {
-    return std::pair(r.acknowledged.has_value(), r.severity);
-  });
+// By which reasons are in order.
+std::pair<bool, Severity> urgency(const AttentionReason& r) {
+  return {r.acknowledged.has_value(), r.severity};
 }
 
 // What to do about a contradiction that no corrected value of its channel ends.
@@ -80,16 +79,12 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
                                    utc_text(s.received_utime_us).substr(0, 19), s.mission_id),
                        "Check the robot's power and its network."});
   if (live && model == nullptr)
-    reasons.push_back({"no_robot_file",
-                       Severity::warning,
-                       {},
+    reasons.push_back({"no_robot_file", Severity::warning, std::nullopt,
                        "It has no robot file: its telemetry is counted, not recorded.",
                        "Add its robot file on its page."});
   if (live && model != nullptr && !battery::at_charger(s.charge.phase) &&
       s.state_of_charge < model->robot.battery.reserve_fraction)  // false for NaN
-    reasons.push_back({"charge_low",
-                       Severity::warning,
-                       {},
+    reasons.push_back({"charge_low", Severity::warning, std::nullopt,
                        fmt::format("Charge {:.0f} %, below the reserve of {:.0f} %.", 100 * s.state_of_charge,
                                    100 * model->robot.battery.reserve_fraction),
                        "Send it to a charger."});
@@ -117,9 +112,7 @@ void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding
                        std::to_string(mark.utime_us)});
   }
   if (found.among_kind && found.among_kind->stands_out)
-    reasons.push_back({"stands_out",
-                       Severity::notice,
-                       {},
+    reasons.push_back({"stands_out", Severity::notice, std::nullopt,
                        fmt::format("Uses {} than its model predicts, unlike the other robots of its kind.",
                                    change(found.among_kind->ratio - 1)),
                        "Check its payload, tyres and floor, or start a diagnosis."});
@@ -174,16 +167,12 @@ Result<void> add_proposals(std::map<std::string, std::vector<AttentionReason>>& 
 
 void add_service(std::vector<AttentionReason>& reasons, const Services& services) {
   if (const history::WriterStatus status = services.writer.status(); !status.healthy)
-    reasons.push_back({"store",
-                       Severity::fault,
-                       {},
+    reasons.push_back({"store", Severity::fault, std::nullopt,
                        "The store does not commit: " + status.error + ".",
                        "Check the disk or the database; the daemon retries automatically."});
   if (services.cluster == nullptr) return;
   if (const server::ClusterStatus status = services.cluster->status(); !status.error.empty())
-    reasons.push_back({"cluster",
-                       Severity::fault,
-                       {},
+    reasons.push_back({"cluster", Severity::fault, std::nullopt,
                        "The cluster's database was not reached: " + status.error + ".",
                        "Check the database and the network between them."});
 }
@@ -329,9 +318,7 @@ std::vector<AttentionEntry> AttentionList::entries() const {
     for (const auto& [robot_id, reasons] : shown_)
       if (!reasons.empty()) entries.push_back({robot_id, reasons});
   }
-  std::ranges::stable_sort(entries, {}, [](const AttentionEntry& e) {
-    return std::pair(e.reasons.front().acknowledged.has_value(), e.reasons.front().severity);
-  });
+  std::ranges::stable_sort(entries, {}, [](const AttentionEntry& e) { return urgency(e.reasons.front()); });
   return entries;
 }
 
@@ -350,7 +337,7 @@ history::Outcome AttentionList::acknowledge(const std::string& robot_id, const s
     any = true;
   }
   if (!any) return fail(Fault::not_found, "kind", "robot " + robot_id + " has no reason of kind " + kind);
-  order(entry.reasons);
+  std::ranges::stable_sort(entry.reasons, {}, urgency);
   const history::Outcome done = commit(entry, {robot_id, topic, by.utime_us, reasons_json(entry.reasons)});
   if (!done) return done;
   const std::lock_guard lock(mutex_);
@@ -433,7 +420,7 @@ void AttentionList::merge(const std::string& robot_id, std::vector<AttentionReas
     if (own) record(robot_id, reason, false);
     changed = true;
   }
-  order(now);
+  std::ranges::stable_sort(now, {}, urgency);
   // A robot without a robot file is stored only when someone acknowledged.
   const bool stored =
       services_.models.find(robot_id) != nullptr ||

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/json_writer.h"
 #include "base/text.h"

@@ -26,7 +26,6 @@ std::string_view name_of(MissionPhase phase) {
 }
 
 const described::Input<MissionEvent>& mission_event_input() {
-  using described::Nothing;
   static const auto input =
       described::Input<MissionEvent>("Request to begin or end a mission")
           .choice(
@@ -46,7 +45,7 @@ const described::Input<MissionEvent>& mission_event_input() {
               {.minimum = 0, .maximum = 1e5},
               "declared load of the mission, when it starts; null or absent: undeclared")
           .text("note", &MissionEvent::note, signals::max_note_length, "free text for people", "")
-          .check([](Fields& fields, MissionEvent& event, Nothing&) {
+          .check([](Fields& fields, MissionEvent& event, described::Nothing&) {
             if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))
               fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
             if (fields.ok() && event.phase != MissionPhase::started && std::isfinite(event.payload_kg))

@@ -4,8 +4,10 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <ranges>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "answers/mission.h"
 #include "base/json_number.h"
@@ -194,21 +196,20 @@ struct BandAnswer {
   history::Band history::TraceBucket::*member;
 };
 
-// A value of each span.
-template <class Get>
-auto of_spans(Get get) {
-  return [get](const TraceAnswer& a) {
-    std::vector<std::decay_t<std::invoke_result_t<Get, const history::TraceBucket&>>> column;
-    for (const history::TraceBucket& bucket : a.trace.buckets) column.push_back(std::invoke(get, bucket));
-    return column;
-  };
+// A value of each item.
+template <class Items, class Get>
+std::vector<double> column_of(const Items& items, Get get) {
+  const auto values = items | std::views::transform(get);
+  return {values.begin(), values.end()};
+}
+
+auto of_spans(double history::TraceBucket::*member) {
+  return [member](const TraceAnswer& a) { return column_of(a.trace.buckets, member); };
 }
 
 auto of_band(double history::Band::*member) {
   return [member](const BandAnswer& a) {
-    std::vector<double> column;
-    for (const history::TraceBucket& bucket : a.trace.buckets) column.push_back(bucket.*a.member.*member);
-    return column;
+    return column_of(a.trace.buckets, [&](const auto& bucket) { return bucket.*a.member.*member; });
   };
 }
 
@@ -231,8 +232,10 @@ const Table<TraceAnswer>& trace_table() {
       Table<A>("A mission over time, in columns")
           .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
           .value("width_us", AT(trace.width_us), "length of each span")
-          .integers("start_utime_us", of_spans(&B::start_utime_us),
-                    "start of each span, microseconds since 1970 by the robot's clock")
+          .integers(
+              "start_utime_us",
+              [](const A& a) { return a.trace.buckets | std::views::transform(&B::start_utime_us); },
+              "start of each span, microseconds since 1970 by the robot's clock")
           .column("covered_s", of_spans(&B::covered_s), "time of each span with telemetry", 6, true)
           .object("measured_power_w", band(&B::measured_power_w), "power from the battery by the sensors",
                   powers)
@@ -263,9 +266,7 @@ struct TelemetryAnswer {
 };
 
 std::vector<double> numbers_of(const TelemetryAnswer& a, std::size_t k) {
-  std::vector<double> column;
-  for (const signals::Sample& sample : a.page.samples) column.push_back(*signals::numbers_of(sample)[k]);
-  return column;
+  return column_of(a.page.samples, [k](const auto& sample) { return *signals::numbers_of(sample)[k]; });
 }
 
 std::string_view words_of(std::string_view key) {
@@ -293,12 +294,7 @@ Table<TelemetryAnswer> make_telemetry() {
   using A = TelemetryAnswer;
   Table<A> table("Samples of a mission as received, in columns; null = not measured");
   const auto integers = [](auto signals::Sample::*member) {
-    return [member](const A& a) {
-      std::vector<std::int64_t> column;
-      for (const signals::Sample& sample : a.page.samples)
-        column.push_back(static_cast<std::int64_t>(sample.*member));
-      return column;
-    };
+    return [member](const A& a) { return a.page.samples | std::views::transform(member); };
   };
   table.value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
       .integers("utime_us", integers(&signals::Sample::utime_us),

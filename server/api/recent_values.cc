@@ -1,8 +1,8 @@
 #include "ingest/recent_values.h"
 
+#include <ranges>
 #include <set>
 #include <string>
-#include <vector>
 
 #include "base/try.h"
 #include "server/api/common_parameters.h"
@@ -19,20 +19,13 @@ struct RecentAnswer {
   const std::vector<ingest::RecentValue>& values;
 };
 
-// A column of the values.
-template <class Get>
-auto each(Get get) {
-  return [get](const RecentAnswer& a) {
-    std::vector<std::decay_t<std::invoke_result_t<Get, const ingest::RecentValue&>>> column;
-    for (const ingest::RecentValue& value : a.values) column.push_back(std::invoke(get, value));
-    return column;
-  };
-}
-
 const Table<RecentAnswer>& recent_table() {
   using A = RecentAnswer;
   using V = ingest::RecentValue;
-  const auto pose = [](std::size_t k) { return each([k](const V& v) { return v.pose[k]; }); };
+  const auto each = [](auto get) {
+    return [get](const A& a) { return a.values | std::views::transform(get); };
+  };
+  const auto pose = [&](std::size_t k) { return each([k](const V& v) { return v.pose[k]; }); };
   static const auto table =
       Table<A>()
           .value("robot_id", &A::robot_id, "robot of the values")

@@ -161,9 +161,8 @@ Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool br
   }
   waiting_.push_back({sample, climb_rad, bridged});
   Result<void> outcome;
-  while (next_ < waiting_.size() && window_complete(next_)) {
+  while (next_ < waiting_.size() && window_complete(next_))
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
-  }
   // Removes history older than the window of the next sample to settle, except the neighbour before it.
   const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].sample.utime_us) -
                          reach_s() / seconds_per_microsecond;
@@ -176,9 +175,8 @@ Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool br
 
 Result<void> Meter::flush() {
   Result<void> outcome;
-  while (next_ < waiting_.size()) {
+  while (next_ < waiting_.size())
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
-  }
   return outcome;
 }
 
@@ -196,9 +194,8 @@ std::size_t Meter::fill_window(std::size_t index) {
          waiting_[last + 1].bridged)
     ++last;
   window_.clear();
-  for (std::size_t k = first; k <= last; ++k) {
+  for (std::size_t k = first; k <= last; ++k)
     window_.push_back({span_us(index, k) * seconds_per_microsecond, waiting_[k].sample.wheel_velocity_rad_s});
-  }
   return index - first;
 }
 
@@ -259,13 +256,6 @@ void Meter::describe_state(const Node& node, MeterPoint& point) const {
   }
 }
 
-void Meter::keep_last(const Node& node) {
-  if (last_ == nullptr)
-    last_ = std::make_unique<Node>(node);
-  else
-    *last_ = node;
-}
-
 Result<void> Meter::settle(std::size_t index) {
   const signals::Sample& sample = waiting_[index].sample;
   const std::size_t place = fill_window(index);
@@ -282,7 +272,7 @@ Result<void> Meter::settle(std::size_t index) {
                  std::isfinite(sample.motor_current_a[0]) && std::isfinite(sample.motor_current_a[1])}};
   node.evaluate(model_);
   if (counted_utime_us_ && sample.utime_us <= *counted_utime_us_) {
-    keep_last(node);
+    last_ = std::make_unique<Node>(node);
     origin_utime_us_ = sample.utime_us;
     return {};
   }
@@ -302,7 +292,7 @@ Result<void> Meter::settle(std::size_t index) {
   node.reading.motion.copper_heat_w = copper_heat_w_;
   if (model_.parameters().thermal_resistance_k_w > 0) node.evaluate(model_);
   describe_state(node, point);
-  keep_last(node);
+  last_ = std::make_unique<Node>(node);
   emit_(point);
   return outcome;
 }

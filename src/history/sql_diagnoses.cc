@@ -10,19 +10,14 @@
 namespace joulecast::history {
 namespace {
 
-tl::unexpected<Error> no_diagnosis(std::int64_t id) {
-  return fail(Fault::not_found, "diagnosis_id", "no diagnosis has id " + std::to_string(id));
-}
-
-tl::unexpected<Error> no_proposal(std::int64_t id) {
-  return fail(Fault::not_found, "proposal_id", "no proposal has id " + std::to_string(id));
+tl::unexpected<Error> none(const std::string& table, std::int64_t id) {
+  return fail(Fault::not_found, table + "_id", "no " + table + " has id " + std::to_string(id));
 }
 
 template <class T>
-Result<T> by_id(Database& database, const std::string& table, std::int64_t id,
-                tl::unexpected<Error> (*none)(std::int64_t)) {
+Result<T> by_id(Database& database, const std::string& table, std::int64_t id) {
   TRY_ASSIGN(auto found, select_one<T>(database, "FROM " + table + " WHERE " + table + "_id = ?", id));
-  if (!found) return none(id);
+  if (!found) return none(table, id);
   return std::move(*found);
 }
 
@@ -72,7 +67,7 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
   Rows rows(database_, update);
   bind_record(rows, d, diagnosis_identity);
   const std::int64_t changed = rows.bind(d.id).run();
-  if (changed == 0) return no_diagnosis(d.id);
+  if (changed == 0) return none("diagnosis", d.id);
   if (!writer_.empty() && d.state != DiagnosisState::queued && d.state != DiagnosisState::running)
     Rows(database_, "DELETE FROM cluster_job WHERE diagnosis_id = ?", d.id).run();
   if (!c.report_html.empty()) {
@@ -113,8 +108,7 @@ Outcome SqlChanges::run(const CloseProposal& c) {
 }
 
 Result<DiagnosisRecord> Store::diagnosis(std::int64_t id) const {
-  return read(
-      [&](Database& database) { return by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis); });
+  return read([&](Database& database) { return by_id<DiagnosisRecord>(database, "diagnosis", id); });
 }
 
 Result<std::vector<DiagnosisRecord>> Store::diagnoses(const std::optional<std::string>& robot_id,
@@ -129,13 +123,13 @@ Result<std::string> Store::diagnosis_report(std::int64_t id) const {
   return read([&](Database& database) -> Result<std::string> {
     Rows rows(database, "SELECT html FROM diagnosis_report WHERE diagnosis_id = ?", id);
     if (rows.next()) return rows.text();
-    TRY(by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis));
+    TRY(by_id<DiagnosisRecord>(database, "diagnosis", id));
     return fail(Fault::not_found, "diagnosis", "diagnosis " + std::to_string(id) + " has no report");
   });
 }
 
 Result<Proposal> proposal(Database& database, std::int64_t id) {
-  return by_id<Proposal>(database, "proposal", id, no_proposal);
+  return by_id<Proposal>(database, "proposal", id);
 }
 
 Result<Proposal> Store::proposal(std::int64_t id) const {
