@@ -73,7 +73,6 @@ class Metrics {
   // Prometheus text exposition format 0.0.4.
   std::string text() const;
 
-  // Content type of text().
   static std::string_view content_type() { return "text/plain; version=0.0.4; charset=utf-8"; }
 
   // Upper bounds for request durations, from 50 µs to 10 s.

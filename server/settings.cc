@@ -257,9 +257,8 @@ std::string Setting::flag() const {
 
 std::string Setting::environment() const {
   std::string name = "JOULECAST_";
-  for (const char c : key) {
+  for (const char c : key)
     name.push_back(c == '.' ? '_' : (c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c));
-  }
   return name;
 }
 
@@ -293,9 +292,7 @@ Result<void> Settings::set(std::string_view key, std::string_view value, Origin 
 Result<void> Settings::read_file_text(std::string_view json_text, std::string_view file) {
   auto document = parse_json(json_text);
   const std::string prefix = std::string(file) + ": ";
-  if (!document) {
-    return invalid(std::string(file), describe(document.error()));
-  }
+  if (!document) return invalid(std::string(file), describe(document.error()));
   if (!document->is_object()) return invalid(std::string(file), "must be a JSON object of sections");
   Problems problems;
   for (const auto& [section, content] : document->items()) {

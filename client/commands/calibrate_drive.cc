@@ -104,9 +104,8 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
   if (all.empty()) return invalid("log", "contains no usable telemetry of " + robot_id + " in a mission");
-  for (telemetry::Recording& r : all) {
+  for (telemetry::Recording& r : all)
     if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
-  }
   for (const telemetry::DroppedReadings& dropped : telemetry::drop_impossible(all, robot))
     fmt::print(stderr, "joulecast: {} samples count as not measured: {}\n", dropped.samples, dropped.why);
   for (const std::string& wanted : options.train) {

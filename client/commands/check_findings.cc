@@ -152,11 +152,10 @@ std::string faults_of(const telemetry::ChannelTally& tally) {
   };
   for (const auto& [reason, fault] : tally.faults) add(reason, fault.first, fault.second);
   // The numbers of two programs count each other's as missing and late.
-  if (tally.senders.size() > 1) {
+  if (tally.senders.size() > 1)
     return text + (text.empty() ? "" : "; ") +
            fmt::format("{} senders, {} and {}: each robot needs its own robot_id", tally.senders.size(),
                        to_string(tally.senders[0]), to_string(tally.senders[1]));
-  }
   const telemetry::SequenceCounters& s = tally.sequence;
   add("missing", s.missing - std::min(s.missing, s.late), "");
   add("duplicate", s.duplicate, "");

@@ -239,9 +239,8 @@ Result<Exit> gap_from_server(const GapOptions& options) {
   Json out = job["result"];
   out["diagnosis_id"] = job["id"];
   std::vector<Error> refusals;
-  if (!options.apply.empty()) {
+  if (!options.apply.empty())
     if (const auto written = write_model(options, job); !written) refusals.push_back(written.error());
-  }
   if (options.adopt) {
     TRY_ASSIGN(const auto adoption, adopt_diagnosis(options, job));
     out["adopted"] = adoption;

@@ -12,7 +12,6 @@
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/diagnosis.h"
 #include "gap/verdict/words.h"
-#include "robot/robot_file.h"
 
 namespace joulecast::client {
 namespace {
@@ -126,10 +125,9 @@ void print_terms(const Json& d) {
   constexpr auto row = "  {:<14}{:>20}{:>13}{:>16}  {}\n";
   if (!baseline["terms"].empty())
     fmt::print(row, "power by term", "in the data", "robot file", "this diagnosis", "unit");
-  for (const auto& [name, term] : baseline["terms"].items()) {
+  for (const auto& [name, term] : baseline["terms"].items())
     fmt::print(row, name, with_deviation(term["value"], term["sd"]), figure_like(term["sd"], term, "model"),
                figure_like(term["sd"], term, "explained"), text(term["unit"]));
-  }
   const Json& reasons = member_at(d, "reasons");
   for (const Json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));

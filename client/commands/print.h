@@ -15,7 +15,6 @@ namespace joulecast::client {
 
 using Json = nlohmann::json;
 
-// A column of a table.
 struct Column {
   std::string title;
   std::string member = {};  // of a row, "energy/battery_j"

@@ -93,9 +93,8 @@ Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer
   const auto publish = [&](const telemetry::LogEvent& event) -> Result<bool> {
     // Waits shorter than the scheduler's grain are left to add up.
     const auto due = pacer.due(event.timestamp_us);
-    if (due > Clock::now() + std::chrono::microseconds(200) || tally.events % 64 == 0) {
+    if (due > Clock::now() + std::chrono::microseconds(200) || tally.events % 64 == 0)
       if (interrupt.wait_until(due)) return false;
-    }
     TRY(link.publish(std::string(event.channel), event.data));
     progress.passed(event);
     return true;

@@ -123,9 +123,8 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
     if (!signals::is_valid_robot_id(id))
       return invalid(source + "#/robot_id", "\"" + id + "\" is no robot id");
     if (std::any_of(members.begin(), members.end(),
-                    [&](const FleetMember& m) { return m.spec.robot.robot_id == id; })) {
+                    [&](const FleetMember& m) { return m.spec.robot.robot_id == id; }))
       return invalid("robot", "two robots are called " + id);
-    }
     vr::SimulationSpec& spec = member.spec;
     spec.imperfections = imperfections;
     spec.world = floor;
@@ -173,9 +172,7 @@ struct Outlets {
       const auto key = keys.find(robot_id);
       TRY(key == keys.end() ? link->publish(channel, bytes) : publish_signed(channel, bytes, key->second));
     }
-    if (log) {
-      TRY(log->write(emission.utime_us, channel, bytes));
-    }
+    if (log) TRY(log->write(emission.utime_us, channel, bytes));
     return {};
   }
 
@@ -190,10 +187,9 @@ struct Outlets {
 };
 
 void print_effects() {
-  for (const auto& entry : vr::all_effects()) {
+  for (const auto& entry : vr::all_effects())
     std::printf("%-26s %-10s up to %g%s\n", std::string(entry.id).c_str(), std::string(entry.unit).c_str(),
                 entry.search_limit, entry.outside ? "  (outside the catalogue)" : "");
-  }
 }
 
 Result<void> write_truth(const SimulateOptions& options, const std::vector<FleetMember>& members,
@@ -274,11 +270,10 @@ std::vector<vr::SimulationSpec> timed_specs(const std::vector<FleetMember>& memb
 }
 
 void announce(const std::vector<vr::SimulationSpec>& specs, const std::string& lcm_url) {
-  for (const auto& spec : specs) {
+  for (const auto& spec : specs)
     std::printf("%s: %g kg, up to %g m/s, %g V\n", spec.robot.robot_id.c_str(),
                 spec.robot.chassis_kg + 2 * spec.robot.wheel_kg, spec.robot.speed_limit_m_s,
                 spec.robot.nominal_voltage_v);
-  }
   std::printf("publishing on %s; ctrl-C stops\n", lcm_url.c_str());
   std::fflush(stdout);
 }
@@ -311,9 +306,8 @@ Result<Published> publish(vr::Fleet& fleet, std::int64_t start_us, const Simulat
     progress.reach(static_cast<std::uint64_t>(at_s));
     ++sent.messages;
   }
-  for (const auto& message : fleet.abort()) {
+  for (const auto& message : fleet.abort())
     TRY(outlets.send(fleet.robot(message.robot).robot_id(), message.emission));
-  }
   if (outlets.log) {
     TRY(outlets.log->close());
     TRY(outlets.log_file->commit());
@@ -326,9 +320,7 @@ Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
   TRY_ASSIGN(const auto start_utime_us, parse_time(options.start, "--start"));
   TRY_ASSIGN(auto members, assemble(options));
   TRY_ASSIGN(auto outlets, open_outlets(options, over_lcm));
-  if (!options.server.empty()) {
-    TRY(introduce(members, options.server));
-  }
+  if (!options.server.empty()) TRY(introduce(members, options.server));
   const std::vector<vr::SimulationSpec> specs = timed_specs(members, options, start_utime_us, over_lcm);
   vr::Fleet fleet(specs, options.seed);
   if (!options.quiet && over_lcm) announce(specs, *options.lcm_url);

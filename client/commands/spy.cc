@@ -13,13 +13,10 @@
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
-#include "client/interrupt.h"
 #include "telemetry/log_recordings.h"
 
 namespace joulecast::client {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct SpyOptions {
   std::string lcm_url = usual_lcm_url(), robot_id;

@@ -30,9 +30,8 @@ World draw_world(Rng& rng, double map_half_width_m) {
 
 Fleet::Fleet(const std::vector<SimulationSpec>& specs, std::uint64_t seed) {
   robots_.reserve(specs.size());
-  for (std::size_t k = 0; k < specs.size(); ++k) {
+  for (std::size_t k = 0; k < specs.size(); ++k)
     robots_.emplace_back(specs[k], Rng::stream(seed, 1000 + k).next());
-  }
   open_.resize(robots_.size());
   for (auto& robot : robots_) {
     Emission first;
@@ -42,9 +41,8 @@ Fleet::Fleet(const std::vector<SimulationSpec>& specs, std::uint64_t seed) {
 
 std::optional<Fleet::Message> Fleet::next() {
   std::optional<std::size_t> earliest;
-  for (std::size_t k = 0; k < waiting_.size(); ++k) {
+  for (std::size_t k = 0; k < waiting_.size(); ++k)
     if (waiting_[k] && (!earliest || waiting_[k]->utime_us < waiting_[*earliest]->utime_us)) earliest = k;
-  }
   if (!earliest) return std::nullopt;
   Message message{*earliest, std::move(*waiting_[*earliest])};
   auto& open = open_[*earliest];

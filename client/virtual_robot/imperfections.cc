@@ -74,10 +74,9 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
   Imperfections result;
   for (const auto& [id, strength] : effects) {
     const auto* entry = std::find_if(table.begin(), table.end(), [&](const auto& e) { return e.id == id; });
-    if (entry == table.end()) {
+    if (entry == table.end())
       return invalid("--effect", id + " is not an effect; --list-effects lists them" +
                                      did_you_mean(id, table, &EffectEntry::id));
-    }
     if (!std::isfinite(strength) || std::abs(strength) > entry->search_limit) {
       std::ostringstream text;
       text << "the strength of " << id << " must be -" << entry->search_limit << " to "
@@ -92,9 +91,8 @@ Result<Imperfections> make_imperfections(const std::vector<EffectStrength>& effe
 
 std::vector<EffectStrength> effects_of(const Imperfections& imperfections) {
   std::vector<EffectStrength> result;
-  for (const auto& entry : table) {
+  for (const auto& entry : table)
     if (imperfections.*(entry.strength) != 0) result.emplace_back(entry.id, imperfections.*(entry.strength));
-  }
   return result;
 }
 

@@ -87,10 +87,9 @@ void Plant::set_payload(double declared_kg) {
 }
 
 void Plant::set_winding_rise(const std::array<double, 2>& kelvin) {
-  for (std::size_t s : {0u, 1u}) {
+  for (std::size_t s : {0u, 1u})
     resistance_ohm_[s] = robot_.resistance_ohm * (1 + effect_.resistance_error) * scatter_.resistance *
                          (1 + copper_per_kelvin * kelvin[s]);
-  }
 }
 
 void Plant::update_inertia() {
@@ -174,16 +173,14 @@ Plant::Body Plant::body(const PlantState& s, double v, double yaw, PlantAccounts
   power.scrub = scrub_nm * yaw;
 
   double floor_n = payload_floor_n_;
-  if (effect_.floor_resistance_zone != 0) {
+  if (effect_.floor_resistance_zone != 0)
     floor_n += effect_.floor_resistance_zone * weight_n_ * zone_share(s.x_m, s.y_m);
-  }
   if (effect_.x_floor_patches != 0)
     floor_n += effect_.x_floor_patches * weight_n_ * patch_share(s.x_m, s.y_m);
   floor_n += payload_flex_n_s_m_ * std::abs(v);
   double dry_factor = 1;
-  if (effect_.x_cold_bearing != 0) {
+  if (effect_.x_cold_bearing != 0)
     dry_factor += effect_.x_cold_bearing * std::exp(-time_since_start_s_ / world_.burst_time_s);
-  }
   if (effect_.x_brake_drag != 0 && brake_holds()) dry_factor += effect_.x_brake_drag;
   return {force_n, moment_nm, floor_n, dry_factor};
 }
@@ -214,10 +211,9 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
     const double bend_rate = bristle_.bend_rate(s.bend[side], w);
     const double ratio = Bristle::torque_ratio(s.bend[side], bend_rate, w);
     double internal_nm = dry_nm * ratio + viscous_nm_s_rad_ * w + cubic_nm_s3_rad3_ * w * w * w;
-    if (effect_.x_cold_grease != 0) {
+    if (effect_.x_cold_grease != 0)
       internal_nm += effect_.x_cold_grease * dry_nm_[side] * w * robot_.wheel_radius_m /
                      robot_.speed_limit_m_s * std::exp(-time_since_start_s_ / world_.burst_time_s);
-    }
     if (effect_.x_oval_wheel != 0)
       internal_nm += effect_.x_oval_wheel * dry_nm_[side] * std::sin(s.wheel_angle_rad[side]);
 
@@ -313,16 +309,12 @@ std::array<double, 2> Plant::copper_power_w() const {
 double Plant::outside_load_w() const {
   double load_w = 0;
   if (effect_.x_radio_zone != 0) load_w += effect_.x_radio_zone * zone_share(state_.x_m, state_.y_m);
-  if (effect_.x_periodic_load != 0 &&
-      std::fmod(time_since_start_s_, world_.period_s) < 0.5 * world_.period_s) {
+  if (effect_.x_periodic_load != 0 && std::fmod(time_since_start_s_, world_.period_s) < 0.5 * world_.period_s)
     load_w += effect_.x_periodic_load;
-  }
-  if (effect_.x_start_burst != 0) {
+  if (effect_.x_start_burst != 0)
     load_w += effect_.x_start_burst * std::exp(-time_since_start_s_ / world_.burst_time_s);
-  }
-  if (effect_.x_heading_load != 0) {
+  if (effect_.x_heading_load != 0)
     load_w += effect_.x_heading_load * 0.5 * (1 + std::cos(state_.heading_rad - world_.slope_direction_rad));
-  }
   if (std::abs(yaw_rate_rad_s()) > turning_rad_s) load_w += effect_.x_turn_lamp;
   return load_w + effect_.x_warm_fan * warmth_w_;
 }

@@ -30,9 +30,8 @@ struct Bristle {
   double bend_rate(double bend, double speed_rad_s) const {
     const double magnitude = std::abs(speed_rad_s);
     double slip_level = 1;
-    if (stribeck_fraction != 0) {
+    if (stribeck_fraction != 0)
       slip_level += stribeck_fraction * std::exp(-std::pow(magnitude / stribeck_speed_rad_s, stribeck_power));
-    }
     return (speed_rad_s - magnitude * bend / slip_level) / bend_angle_rad;
   }
 

@@ -83,10 +83,9 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   if (friction == nullptr || !friction->is_array() || friction->size() != 2) {
     in.report("/motor/friction_torque_nm", "must be [right, left]");
   } else {
-    for (std::size_t side : {0u, 1u}) {
+    for (std::size_t side : {0u, 1u})
       p.friction_torque_nm[side] = in.check("/motor/friction_torque_nm/" + std::to_string(side),
                                             (*friction)[side], Sign::not_negative);
-    }
   }
   p.nominal_voltage_v = in.number("/battery/nominal_voltage_v", Sign::positive);
   p.capacity_ah = in.number("/battery/capacity_ah", Sign::positive);
@@ -116,9 +115,8 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.yaw_rate_limit_rad_s = in.number("/limits/yaw_rate_rad_s", Sign::positive);
   p.current_limit_a = in.number("/limits/current_a", Sign::positive);
   p.payload_limit_kg = in.number("/limits/payload_kg", Sign::not_negative, 0);
-  if (const Json* effects = in.find("/effects"); effects != nullptr && !effects->empty()) {
+  if (const Json* effects = in.find("/effects"); effects != nullptr && !effects->empty())
     in.report("/effects", "must be empty: a virtual robot's imperfections are given with --effect");
-  }
   if (!in.fault().message.empty()) return tl::unexpected(in.fault());
   return p;
 }

@@ -70,10 +70,9 @@ signals::Sample Sensors::sample(const Reading& truth) {
                                suite_.battery_current_step_a);
   if (suite_.gyro) out.yaw_rate_rad_s = r.yaw_rate_rad_s + gyro_bias_rad_s_ + noise(suite_.gyro_noise_rad_s);
   if (suite_.pitch) out.pitch_rad = r.pitch_rad + noise(suite_.pitch_noise_rad);
-  if (suite_.pose) {
+  if (suite_.pose)
     out.pose = {r.pose[0] + noise(suite_.pose_noise_m), r.pose[1] + noise(suite_.pose_noise_m),
                 r.pose[2] + noise(suite_.heading_noise_rad)};
-  }
   if (suite_.payload) out.payload_kg = r.declared_payload_kg;
   return out;
 }

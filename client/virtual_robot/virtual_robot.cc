@@ -60,9 +60,8 @@ std::int64_t VirtualRobot::now_us() const {
 
 double VirtualRobot::sample_time_s(std::int64_t index) {
   double time_s = static_cast<double>(index) / spec_.rate_hz;
-  if (spec_.sensors.sampling_jitter > 0) {
+  if (spec_.sensors.sampling_jitter > 0)
     time_s += spec_.sensors.sampling_jitter * sensors_.rng().uniform(-1, 1) / spec_.rate_hz;
-  }
   return time_s;
 }
 
@@ -286,9 +285,8 @@ void VirtualRobot::run_period() {
                                  ? spec_.imperfections.winding_temperature
                                  : usual_thermal_resistance_k_w;
   const double share = -std::expm1(-SpeedController::period_s / spec_.world.thermal_time_constant_s);
-  for (std::size_t side : {0u, 1u}) {
+  for (std::size_t side : {0u, 1u})
     winding_rise_k_[side] += share * (thermal_k_w * copper_w[side] - winding_rise_k_[side]);
-  }
   if (spec_.imperfections.winding_temperature != 0) plant_.set_winding_rise(winding_rise_k_);
 
   mission_.duration_s += SpeedController::period_s;

@@ -263,9 +263,8 @@ Result<Response> remove(Services& services, const Request& request) {
 
 Result<Response> state(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  if (services.models.find(id) == nullptr && services.fleet.find(id) == nullptr) {
+  if (services.models.find(id) == nullptr && services.fleet.find(id) == nullptr)
     return tl::unexpected(ingest::unknown_robot("id", id));
-  }
   JsonWriter json;
   write_robot_state(json, services, id);
   return http::json_response(json.take());

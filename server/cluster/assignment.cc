@@ -47,9 +47,8 @@ Assignment assign(const history::ClusterState& state, const Asker& asker) {
     if (asker.is_alive(member)) alive.push_back(member.node);
   }
   std::map<std::string, Hearers, std::less<>> hearers;
-  for (const history::Hearing& each : state.hearings) {
+  for (const history::Hearing& each : state.hearings)
     if (std::ranges::find(alive, each.node) != alive.end()) hearers[each.robot_id].add(each);
-  }
   std::map<std::string, history::Lease, std::less<>> leases;
   for (const history::Lease& lease : state.leases) leases.emplace(lease.robot_id, lease);
   for (const auto& [robot_id, of_robot] : hearers) {

@@ -373,9 +373,7 @@ Result<std::size_t> Cluster::reassign(const history::ClusterState& state) {
     const std::lock_guard lock(mutex_);
     ++status_.handovers;
   }
-  if (!assigned.free.empty()) {
-    TRY(leases_->free(assigned.free));
-  }
+  if (!assigned.free.empty()) TRY(leases_->free(assigned.free));
   return assigned.take.size();
 }
 

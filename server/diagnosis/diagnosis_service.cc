@@ -139,9 +139,7 @@ Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, c
       return fail(Fault::not_found, field,
                   "mission " + std::to_string(request.missions[k]) + " is one of robot " + mission->robot_id);
   }
-  if (request.missions.empty()) {
-    TRY(any_ended(request));
-  }
+  if (request.missions.empty()) TRY(any_ended(request));
   auto job = std::make_shared<Job>();
   job->request = request;
   DiagnosisRecord& record = job->record;
@@ -382,9 +380,8 @@ void DiagnosisService::finish(Job& job, DiagnosisState state, std::string error,
   if (const auto stored = parts_.writer.execute(update); !stored) {
     parts_.on_error(stored.error());
     // Minutes of work wait until the store takes data again.
-    if (stored.error().fault == Fault::unavailable) {
+    if (stored.error().fault == Fault::unavailable)
       if (const auto waits = parts_.writer.offer(std::move(update)); !waits) parts_.on_error(waits.error());
-    }
   }
   settle(job);
 }

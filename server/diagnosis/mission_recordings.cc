@@ -92,9 +92,7 @@ Result<StoredRecordings> read_recordings(const history::Store& store, const Reco
   history::PageRequest page;
   do {
     TRY_ASSIGN(history::MissionPage found, store.missions(filter, page));
-    for (const history::Mission& mission : found.missions) {
-      TRY(reader.take(mission));
-    }
+    for (const history::Mission& mission : found.missions) TRY(reader.take(mission));
     page.cursor = std::move(found.next_cursor);
   } while (!page.cursor.empty() && !reader.full());
   return reader.finish();

@@ -17,8 +17,7 @@ namespace joulecast::http {
 struct TlsFiles {
   std::string certificate;  // with those that it builds on
   std::string key;
-  std::string client_authorities;  // issuers of the certificate that every client must present; empty: no
-                                   // certificate is required
+  std::string client_authorities;  // of every client's certificate; empty: none is required
 
   bool given() const { return !certificate.empty() || !key.empty() || !client_authorities.empty(); }
 };

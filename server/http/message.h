@@ -47,8 +47,7 @@ struct Request {
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
   bool deprecated = false;                     // came to an endpoint's former path
-  std::string id;                              // request id: the client's X-Request-Id if valid, else
-                                               // generated
+  std::string id;                              // the client's X-Request-Id if valid, else generated
   mutable Kept kept = {};                      // filled by the handler's wrapper
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
   // Run), and when the server's grace time at a stop has ended. The handler's result is then not sent.
@@ -73,8 +72,7 @@ class StreamSource {
  public:
   enum class Next : std::uint8_t {
     more,  // `out` holds a piece, call again when it has been written
-    wait,  // nothing for now (`out` may hold a piece); call again after the wake function was called, or in a
-           // second
+    wait,  // nothing for now (`out` may hold a piece); call again after the wake function, or in a second
     end,   // `out` holds the last piece, which may be empty
     abort  // the stream is broken: close the connection without a proper end
   };

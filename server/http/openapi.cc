@@ -116,7 +116,6 @@ ordered_json security_of(Role role) {
   return ordered_json::array({{{"bearer", roles}}, {{"session", roles}}});
 }
 
-// The endpoint that serves the document.
 Endpoint self_endpoint(std::shared_ptr<const Asset> document) {
   return {.path = "/openapi.json",
           .operation_id = "getOpenApi",

@@ -28,7 +28,6 @@ struct ReadinessCheck {
 // GET /healthz, /readyz, /metrics, /version.
 std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<ReadinessCheck> checks);
 
-// Their schemas.
 described::Schemas operations_schemas();
 
 // GET /v1/events: the live fleet as server-sent events; ?robot_id= selects one robot.

@@ -15,7 +15,6 @@
 #include <optional>
 #include <string>
 #include <unordered_set>
-#include <vector>
 
 #include "server/http/admission.h"
 #include "server/http/delivery.h"

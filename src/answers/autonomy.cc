@@ -159,7 +159,6 @@ std::optional<forecast::Limitation> limitation_of(const AutonomyInput& input, co
 }
 
 using described::Input;
-using described::Presence;
 
 constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
 constexpr std::size_t max_id_bytes = 200;
@@ -301,7 +300,7 @@ const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
           })
           .list("tasks", AT(input.tasks), tasks_of_autonomy,
                 "tasks in the order of execution; null or absent: no task forecast", task_input(),
-                Presence::optional);
+                described::Presence::optional);
   return input;
 }
 
@@ -643,11 +642,10 @@ Result<forecast::Charge> charge_of(const std::optional<double>& given, const std
                                    const std::optional<double>& reserve, const robot::Battery& battery,
                                    const LiveRobot& now) {
   const double charge = given.value_or(now.state_of_charge);
-  if (!std::isfinite(charge)) {
+  if (!std::isfinite(charge))
     return fail(Fault::infeasible, "/state_of_charge",
                 "is unknown: the robot has never reported battery voltage and current; state it in the "
                 "request");
-  }
   const double live_sd = std::isfinite(now.state_of_charge_sd) ? now.state_of_charge_sd : 0;
   return forecast::Charge{charge, given_sd.value_or(given ? 0 : live_sd),
                           reserve.value_or(battery.reserve_fraction)};
@@ -750,10 +748,9 @@ Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, c
 
 std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& a, const RobotOutlook& robot,
                           const LiveRobot& now) {
-  if (request.dialect != Dialect::joulecast) {
+  if (request.dialect != Dialect::joulecast)
     return battery_dialect(
         request.dialect, battery_status(robot.model->robot.battery, *robot.battery, a.charge, a.reach, now));
-  }
   return autonomy_table().text({request, a, robot, now});
 }
 

@@ -39,9 +39,7 @@ using described::Input;
 using described::Presence;
 using described::Table;
 using planning::Limits;
-using planning::Point;
 using planning::Pose;
-using planning::Problem;
 
 constexpr std::size_t max_points = 100'000;
 constexpr double max_length_m = 1e5;
@@ -69,7 +67,7 @@ auto tightened(double Limits::*limit) {
 const described::Variants<planning::Segment, PathContext>& segments() {
   using namespace planning;
   constexpr const char* length_words = "length; for a detour, of the straight line";
-  static const auto point = point_input<Point>("place on the map");
+  static const auto point = point_input<planning::Point>("place on the map");
   static const auto forms =
       described::Variants<Segment, PathContext>("kind")
           .of("straight", "a straight",

@@ -43,14 +43,12 @@ struct EstimateOutput {
 Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& robot,
                                 const std::stop_token& stop = {});
 
-// "estimate-request" and "estimate".
 described::Schemas estimate_schemas();
 // Errors name the field.
 Result<EstimateInput> read_estimate(const nlohmann::json& request, const robot::RobotModel& robot);
 std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
                           const ModelInForce& model);
 
-// From request to answer.
 Result<std::string> estimate_answer(const nlohmann::json& request, const RobotOutlook& robot);
 
 }  // namespace joulecast::answers

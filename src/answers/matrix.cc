@@ -53,14 +53,13 @@ forecast::PlannedLeg leg_of(const planning::Stretch& stretch, double payload_kg)
 
 using Json = nlohmann::json;
 
-using described::Count;
 using described::Input;
 using described::Presence;
 using described::Table;
 using planning::MatrixTask;
 using Robot = MatrixInput::Robot;
 
-constexpr Count robots_of_matrix{1, 10'000}, tasks_of_matrix{1, 10'000};
+constexpr described::Count robots_of_matrix{1, 10'000}, tasks_of_matrix{1, 10'000};
 // Of minimum-energy and of usual driving, which takes ten times the work, 11 s of CPU for so many.
 constexpr std::size_t max_cells = 4'000'000, max_usual_cells = 1'000'000;
 constexpr std::size_t rows_per_piece = 16;

@@ -11,7 +11,6 @@
 namespace joulecast::answers {
 namespace {
 
-using described::of_array;
 using described::of_object;
 using described::of_type;
 using described::or_null;
@@ -134,7 +133,7 @@ Schema findings_schema() {
 }
 
 Schema contradictions_schema() {
-  return of_array(of_object(
+  return described::of_array(of_object(
       {}, {},
       {{"kind", text("as in the robot's state")},
        {"id", text("identifier, such as battery_current_reversed")},

@@ -49,13 +49,11 @@ std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const Mo
 Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model,
                             const std::stop_token& stop = {});
 
-// "profile-request" and "profile".
 described::Schemas profile_schemas();
 // Errors name the field.
 Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot);
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model);
 
-// From request to answer.
 Result<std::string> profile_answer(const nlohmann::json& request, const ModelInForce& model);
 
 }  // namespace joulecast::answers

@@ -11,8 +11,7 @@ enum class Fault {
   invalid,      // the caller's input breaks a stated constraint
   not_found,    // the named thing does not exist
   conflict,     // the request contradicts the present state
-  infeasible,   // the input is well-formed but no solution satisfies it; the message gives the nearest
-                // feasible value
+  infeasible,   // the input is well-formed but has no solution; the message gives the nearest feasible value
   too_large,    // a stated limit on size or count is exceeded
   unavailable,  // a resource is missing for now (disk, network, shutting down)
   stopped,      // the caller no longer waits for the answer

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/json_text.h"
 #include "base/try.h"
@@ -117,9 +116,8 @@ std::string Fields::text(std::string_view name, std::size_t max_length, std::opt
 
 std::string Fields::choice(std::string_view name, const std::vector<std::string_view>& words) {
   std::string value = text(name, 256);
-  if (ok() && std::ranges::find(words, value) == words.end()) {
+  if (ok() && std::ranges::find(words, value) == words.end())
     fault(name, fmt::format("is \"{}\", must be one of {}", value, fmt::join(words, ", ")));
-  }
   return value;
 }
 

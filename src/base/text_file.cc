@@ -43,10 +43,9 @@ Result<std::string> read_text_file(const std::filesystem::path& path, std::size_
   // Opening a pipe waits for a program that writes to it.
   if (std::filesystem::is_fifo(status)) return invalid(path.string(), "is a pipe, must be a file");
   std::ifstream file(path, std::ios::binary);
-  if (!file) {
+  if (!file)
     return fail(errno == ENOENT || errno == ENOTDIR ? Fault::not_found : Fault::unavailable, path.string(),
                 std::string("cannot be opened: ") + std::strerror(errno));
-  }
   return read_text(file, path.string(), max_bytes, max_line_bytes);
 }
 

@@ -253,7 +253,6 @@ class Table {
   void write_members(JsonWriter& out, const T& object) const {
     for (const auto& writer : writers_) writer(out, object);
   }
-  // The JSON text of the object.
   std::string text(const T& object) const {
     JsonWriter out;
     return write(out, object).take();

@@ -77,9 +77,8 @@ Result<ActiveEffect> activate(const robot::AdoptedEffect& adopted) {
 robot::AdoptedEffect adopt(const ActiveEffect& active) {
   const EffectInfo& info = active.effect->info();
   robot::AdoptedEffect adopted{std::string(info.id), {}};
-  for (std::size_t k = 0; k < info.parameters.size(); ++k) {
+  for (std::size_t k = 0; k < info.parameters.size(); ++k)
     adopted.parameters.emplace_back(info.parameters[k].name, active.values[k]);
-  }
   return adopted;
 }
 

@@ -37,12 +37,11 @@ void add_entry(std::string& out, const EffectInfo& info) {
   out += "    " + std::string(info.formula) + "\n\n";
   out += "| parameter | unit | bounds | unless given | meaning |\n|---|---|---|---|---|\n";
   char name = 'a';
-  for (const EffectParameter& p : info.parameters) {
+  for (const EffectParameter& p : info.parameters)
     out += "| `" + std::string(1, name++) + "` `" + std::string(p.name) + "` | " +
            (p.unit == "1" ? "-" : cell(p.unit)) + " | " + number(p.minimum) + " to " + number(p.maximum) +
            " | " + (&p == info.parameters.data() ? "required" : number(p.initial)) + " | " + cell(p.meaning) +
            " |\n";
-  }
   out += "\nHolds for: " + std::string(info.validity) + ".";
   if (info.needs_position) out += " Needs the position on the map.";
   if (info.needs_heading) out += " Needs the heading.";
@@ -68,9 +67,8 @@ std::string catalogue_markdown() {
       "radius, `l` half track, `w` wheel speed, `v` speed, `m` mass with payload, `i` motor current.\n\n";
   for (const ActsOn group : groups) {
     out += "## Acting on: " + std::string(name_of(group)) + "\n\n";
-    for (const Effect* effect : catalogue()) {
+    for (const Effect* effect : catalogue())
       if (effect->info().acts_on == group) add_entry(out, effect->info());
-    }
   }
   out.pop_back();
   return out;

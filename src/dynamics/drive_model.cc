@@ -41,9 +41,8 @@ BasicDriveModel<S>::BasicDriveModel(const robot::RobotModel& robot, std::span<co
     : parameters_(nominal_parameters<S>(robot)) {
   apply(effects, [&](std::size_t k) {
     EffectValues<Dual> values{};
-    for (std::size_t i = 0; i < values.size(); ++i) {
+    for (std::size_t i = 0; i < values.size(); ++i)
       values[i] = Dual(effects[k].values[i], k == effect && i == parameter ? 1.0 : 0.0);
-    }
     return values;
   });
 }
@@ -80,9 +79,8 @@ TorqueBalance<S> BasicDriveModel<S>::balance(const Instant& at) const {
     b.inertial_nm[s] = ground[s] + p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
     S transmitted = b.inertial_nm[s];
     S inside = 0;
-    for (std::size_t k = 0; k < load_count && !loads_.empty(); ++k) {
+    for (std::size_t k = 0; k < load_count && !loads_.empty(); ++k)
       (k == static_cast<std::size_t>(Load::internal) ? inside : transmitted) += b.loads.torque[k][s];
-    }
     b.friction_nm[s] = p.friction_torque_nm[s] * context.direction[s] +
                        p.viscous_friction_nm_s_rad * at.wheel_speed_rad_s[s];
     b.gear_nm[s] =

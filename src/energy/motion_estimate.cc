@@ -94,10 +94,9 @@ Result<std::array<double, 2>> climb_of_span(const MotionPoint& a, const MotionPo
   const double way = 0.5 * (a.speed_m_s + b.speed_m_s) * (b.time_s - a.time_s);
   if (rise == 0) return std::array{0.0, 0.0};
   const double climb = dynamics::climb_over(rise, way);
-  if (std::isnan(climb)) {
+  if (std::isnan(climb))
     return invalid("height_m", "changes by " + std::to_string(rise) + " m over " + std::to_string(way) +
                                    " m of way, steeper than 45 degrees");
-  }
   return std::array{climb, climb};
 }
 

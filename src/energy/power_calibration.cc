@@ -436,9 +436,8 @@ Result<MissedPower> predict_halves(const PowerParameters& parameters, const Powe
     TRY_ASSIGN(const auto found, find(parameters, data, use, robot));
     const dynamics::DriveModel model = found.parameters.model(found.fit.x);
     const PlainRegression plain(windows_of(data, use), robot);
-    for (const windows::Window& w : data.windows) {
+    for (const windows::Window& w : data.windows)
       if (!use(w.block)) missed.add(w, by_file, model, plain);
-    }
   }
   return missed.value();
 }

@@ -59,7 +59,6 @@ struct Estimate {
 // The values of a robot file that are refined, in the order of Unknown.
 std::array<double, refined_count> refined_values(const robot::RobotModel& robot);
 
-// The findings of one mission.
 struct MissionFinding {
   std::size_t equations = 0;
   bool enough = false;  // for a finding

@@ -71,9 +71,8 @@ const std::string& robot_of(const T& c) {
 std::optional<Fence> fence_of(const Command& command) {
   return std::visit(
       []<class T>(const T& c) -> std::optional<Fence> {
-        if constexpr (Fenced<T>) {
+        if constexpr (Fenced<T>)
           if (c.epoch != 0) return Fence{robot_of(c), c.epoch};
-        }
         return std::nullopt;
       },
       command);

@@ -65,8 +65,7 @@ inline constexpr std::array<std::string_view, mission_state_count> names_of<Miss
 // Summary of one covariate over a mission, in its own unit.
 struct CovariateSummary {
   std::string name;
-  double mean = signals::unmeasured;  // over the time with a value; of a label the share of that time in
-                                      // which it applied
+  double mean = signals::unmeasured;  // over the time with a value; of a label the share of that time with it
   double min = signals::unmeasured;
   double max = signals::unmeasured;
   double known_s = 0;                  // the mean counts over so long, up to counted_utime_us

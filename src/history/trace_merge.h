@@ -7,7 +7,6 @@
 
 namespace joulecast::history {
 
-// The band of one value.
 constexpr Band single(double value) {
   return {value, value, value};
 }

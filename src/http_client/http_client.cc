@@ -28,9 +28,8 @@ Result<ServerAddress> parse_url(std::string_view url, const std::string& field) 
     authority = authority.substr(0, colon);
     const bool digits = std::all_of(address.port.begin(), address.port.end(),
                                     [](unsigned char c) { return std::isdigit(c) != 0; });
-    if (address.port.empty() || address.port.size() > 5 || !digits || std::stoi(address.port) > 65535) {
+    if (address.port.empty() || address.port.size() > 5 || !digits || std::stoi(address.port) > 65535)
       return invalid(field, "has no valid port");
-    }
   }
   if (authority.starts_with('[') && authority.ends_with(']'))
     authority = authority.substr(1, authority.size() - 2);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
 
 #include "plausibility/check.h"
 #include "telemetry/impossible.h"
@@ -19,8 +18,7 @@ constexpr std::uint64_t first_samples = 300;  // of a mission, before its channe
 constexpr std::uint64_t rate_samples = 20;    // ... and its rate, of 2 Hz within 10 s
 constexpr double constant_s =
     10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
-constexpr double says_enough_s = 60;  // of motion, after which a contradiction that is no longer detected is
-                                      // cleared
+constexpr double says_enough_s = 60;  // of motion, after which a contradiction that is gone is cleared
 // Multiple of the speed or yaw rate limit that no robot reaches by overshoot: such readings are not its
 // motion.
 constexpr double absurd_limit = 3;

@@ -23,8 +23,7 @@ enum class IngestFault : std::size_t {
   implausible,      // a value is missing, infinite or absurd
   impossible,       // a reading that this robot cannot have; the sample is accounted for without it
   duplicate,
-  late,     // out of order; older than the last accounted sample. Of a covariate: older than the present
-            // value
+  late,     // out of order, older than the last accounted sample or a covariate's present value
   missing,  // sequence numbers that never came (or came late)
   restart,  // the robot's sequence restarted
   clock_backward,
@@ -37,8 +36,7 @@ enum class IngestFault : std::size_t {
   replayed,           // signed properly, but sent before, or at another time
   second_sender,      // another sender under the robot's id; not accounted for
   gap,                // a silence too long to be bridged
-  zero_payload,       // payload 0 though the mission's start declared a load: accounted with the declared
-                      // load
+  zero_payload,       // payload 0 though the mission's start declared a load, which is accounted for
   outside_mission,    // belongs to no mission: just after an end, or before a start
   bad_event,          // duplicate, out-of-order or unknown mission event
   event_flood,        // more mission events than the setting allows

@@ -1,7 +1,5 @@
 #include "ingest/fleet_view.h"
 
-#include <utility>
-
 #include "base/byte_archive.h"
 #include "signals/archive_members.h"
 

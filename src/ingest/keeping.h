@@ -40,7 +40,6 @@ class Keeping {
   void note_leases(Leases leases);
   void grant(Grant grant);
   void withdraw(Withdrawal withdrawal);
-  // Withdraws all robots.
   void withdraw_all() {
     for (const auto& [robot_id, epoch] : kept()) withdraw({robot_id, epoch, false});
   }

@@ -63,9 +63,8 @@ Result<void> load_robot(const robot::RobotModel& robot, const std::string& path,
 Result<RobotFiles> read_robot_files(const std::string& directory) {
   std::error_code fault;
   std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(directory, fault)) {
+  for (const auto& entry : std::filesystem::directory_iterator(directory, fault))
     if (entry.path().extension() == ".json") paths.push_back(entry.path());
-  }
   if (fault) return fail(Fault::not_found, "robots.directory", directory + ": " + fault.message());
   std::ranges::sort(paths);
   RobotFiles files;

@@ -13,7 +13,6 @@
 
 namespace joulecast::ingest {
 
-// A version of a robot's model as the store has it.
 Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
                                                          const std::string& robot_id, std::int64_t version);
 

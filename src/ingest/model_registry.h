@@ -16,7 +16,6 @@ using answers::ModelInForce;
 // The error of every answer about a robot id that does not exist.
 Error unknown_robot(std::string field, std::string_view robot_id);
 
-// The models in force.
 class ModelRegistry : ByRobot<ModelInForce> {
  public:
   using ByRobot::all, ByRobot::find, ByRobot::Pointer, ByRobot::size;

@@ -716,10 +716,9 @@ void RobotSession::checkpoint() {
   command.samples = std::exchange(open_->samples, {});
   command.position = taken_in_;
   open_->unsaved = 0;
-  if (std::isfinite(snapshot_.state_of_charge)) {
+  if (std::isfinite(snapshot_.state_of_charge))
     command.resume_state = history::ResumeState{robot_id_, snapshot_.sample.utime_us, last_sequence_,
                                                 snapshot_.state_of_charge, snapshot_.winding_temperature_c};
-  }
   if (open_->record.key > 0) outputs_.post(std::move(command));
 }
 

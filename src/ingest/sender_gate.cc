@@ -150,11 +150,10 @@ std::size_t SenderGate::drop_waiting() {
 }
 
 std::string SenderGate::describe() const {
-  if (returns_ > most_returns) {
+  if (returns_ > most_returns)
     return telemetry::to_string(first_) +
            " sends two streams of sequence numbers under this robot's id; the one at sequence " +
            std::to_string(side_.sequence) + " is not accounted for";
-  }
   return telemetry::to_string(other_) + " publishes under this robot's id in addition to " +
          telemetry::to_string(first_) + ", which alone is accounted for";
 }

@@ -8,7 +8,6 @@
 
 namespace joulecast::report {
 
-// The stated origin of a report.
 struct ReportOrigin {
   std::vector<std::string> sources;  // names of logs, tables or missions; no paths
   std::string model;                 // name of the robot file, or the version in the daemon

@@ -36,9 +36,8 @@ void Information::add(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::R
 
 void Information::integrate_out(const Eigen::VectorXd& sd) {
   std::vector<Eigen::Index> own;
-  for (Eigen::Index k = 0; k < sd.size(); ++k) {
+  for (Eigen::Index k = 0; k < sd.size(); ++k)
     if (sd[k] > 0 && xx(k, k) > 0) own.push_back(k);
-  }
   if (own.empty()) return;
   const Eigen::VectorXd scale = sd(own);
   // In units of their sd, S = Z'Z + 1 is well conditioned.

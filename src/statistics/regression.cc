@@ -38,9 +38,8 @@ Eigen::VectorXd signed_solution(const Eigen::MatrixXd& xx, const Eigen::VectorXd
   std::vector<bool> moves(nonnegative.size());
   const auto solve = [&] {
     std::vector<Eigen::Index> own;
-    for (Eigen::Index k = 0; k < p; ++k) {
+    for (Eigen::Index k = 0; k < p; ++k)
       if (moves[static_cast<std::size_t>(k)]) own.push_back(k);
-    }
     Eigen::VectorXd b = Eigen::VectorXd::Zero(p);
     if (!own.empty()) b(own) = inverse(a(own, own)) * c(own);
     return b;
@@ -51,9 +50,8 @@ Eigen::VectorXd signed_solution(const Eigen::MatrixXd& xx, const Eigen::VectorXd
   for (Eigen::Index added = 0; added < 3 * p; ++added) {
     const Eigen::VectorXd gain = c - a * b;
     Eigen::Index next = -1;
-    for (Eigen::Index k = 0; k < p; ++k) {
+    for (Eigen::Index k = 0; k < p; ++k)
       if (!moves[static_cast<std::size_t>(k)] && gain[k] > (next < 0 ? least : gain[next])) next = k;
-    }
     if (next < 0) break;
     moves[static_cast<std::size_t>(next)] = true;
     for (Eigen::VectorXd target = solve();; target = solve()) {

@@ -31,21 +31,19 @@ enum class Text { id, optional_id, note, covariate_name };
 
 // The fault of a string of the contract; empty if it is valid.
 std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
-  if (text.size() > max_length) {
+  if (text.size() > max_length)
     return "is " + std::to_string(text.size()) + " bytes long; at most " + std::to_string(max_length) +
            " are allowed";
-  }
   if (kind == Text::note) {
     if (text.find('\0') != std::string_view::npos) return "contains a NUL byte";
     return is_utf8(text) ? "" : "is not UTF-8";
   }
   if (text.empty()) return kind == Text::optional_id ? "" : "is empty";
-  if (kind == Text::covariate_name) {
+  if (kind == Text::covariate_name)
     return signals::is_valid_covariate_name(text)
                ? ""
                : "must be 1 to " + std::to_string(signals::max_covariate_name_length) +
                      " of letters, digits, '.', '_' and '-', which '=' and as many more may follow";
-  }
   // Robot ids are such ids, too, but shorter.
   return signals::is_valid_mission_id(text) ? "" : "may contain only letters, digits, '.', '_' and '-'";
 }
@@ -61,9 +59,8 @@ class Guard {
       return;
     }
     const std::uint8_t* at = take(8, "fingerprint");
-    if (at != nullptr && boost::endian::load_big_s64(at) != fingerprint) {
+    if (at != nullptr && boost::endian::load_big_s64(at) != fingerprint)
       refuse("fingerprint", "is not that of the type: another type or another version of it");
-    }
   }
 
   void fixed(std::size_t size, const char* field) { take(size, field); }
@@ -115,9 +112,8 @@ class Guard {
   }
 
   Result<void> finish() {
-    if (!error_ && position_ != bytes_.size()) {
+    if (!error_ && position_ != bytes_.size())
       refuse("", std::to_string(bytes_.size() - position_) + " bytes follow the message");
-    }
     if (error_) return tl::unexpected(std::move(*error_));
     return {};
   }
@@ -157,9 +153,8 @@ Result<Message> decode_guarded(std::span<const std::uint8_t> bytes, Guard& guard
   TRY(guard.finish());
   Message message;
   const int size = static_cast<int>(bytes.size());
-  if (message.decode(bytes.data(), 0, size) != size) {
+  if (message.decode(bytes.data(), 0, size) != size)
     return fail(Fault::internal, "", "the generated decoder refused a message that the guard passed");
-  }
   return message;
 }
 
@@ -167,9 +162,8 @@ template <class Message>
 Result<std::vector<std::uint8_t>> encode(const Message& message) {
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
   const int size = static_cast<int>(bytes.size());
-  if (message.encode(bytes.data(), 0, size) != size) {
+  if (message.encode(bytes.data(), 0, size) != size)
     return fail(Fault::internal, "", "the generated encoder wrote another size than it announced");
-  }
   return bytes;
 }
 
@@ -406,10 +400,9 @@ Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
                                                     const signals::CovariateMessage& message) {
   TRY(check_text("robot_id", robot_id, Text::id, max_covariates_robot_id_length));
   const std::size_t count = message.covariates.size();
-  if (count > signals::max_covariates) {
+  if (count > signals::max_covariates)
     return invalid("n", "is " + std::to_string(count) + "; 0 to " + std::to_string(signals::max_covariates) +
                             " are allowed");
-  }
   robot_covariates_t out;
   out.utime = message.utime_us;
   out.robot_id = robot_id;

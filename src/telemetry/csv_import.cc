@@ -86,8 +86,7 @@ std::string_view line_of(const RowPlace& row) {
 // ones, far before them, or so far behind that no robot is on one mission. A late row fills a hole, and rows
 // without order go back often.
 std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
-  constexpr std::size_t often = 4;  // a clock that starts again goes back in at most one of this number of
-                                    // steps
+  constexpr std::size_t often = 4;  // a clock that starts again goes back in one of so many steps at most
   std::vector<std::int64_t> steps_us;
   std::vector<std::size_t> steps, restarts;  // back, or far forward
   for (std::size_t k = 1; k < rows.size(); ++k) {

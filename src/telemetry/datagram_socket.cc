@@ -70,9 +70,7 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
       return invalid("lcm.url", "'" + std::string(network) + "' is no port (1 to 65535)");
     parsed.port = *port;
   }
-  while (!options.empty()) {
-    TRY(read_option(parsed, take_item(options, '&')));
-  }
+  while (!options.empty()) TRY(read_option(parsed, take_item(options, '&')));
   return parsed;
 }
 
@@ -197,13 +195,12 @@ Result<std::unique_ptr<DatagramSocket>> DatagramSocket::open(const UdpmUrl& url,
   group.sin_port = htons(url.port);
   if (::bind(descriptor, reinterpret_cast<const sockaddr*>(&group), sizeof group) != 0)
     return failed("lcm.url", "cannot bind to the group");
-  if (!set(IPPROTO_IP, IP_ADD_MEMBERSHIP, membership)) {
+  if (!set(IPPROTO_IP, IP_ADD_MEMBERSHIP, membership))
     return failed(interface_address.empty() ? "lcm.url" : "lcm.bind_address",
                   "cannot join the group" +
                       (interface_address.empty()
                            ? " (is there a route to it, as `ip route add 224.0.0.0/4 dev lo` adds?)"
                            : " on " + interface_address));
-  }
   return made;
 }
 

@@ -202,12 +202,10 @@ Result<EventLogWriter> EventLogWriter::create(const std::string& path) {
 Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view channel,
                                    std::span<const std::uint8_t> data) {
   const LogLimits limits;
-  if (channel.empty() || channel.size() > limits.max_channel_length) {
+  if (channel.empty() || channel.size() > limits.max_channel_length)
     return invalid("channel", "must have 1 to " + std::to_string(limits.max_channel_length) + " characters");
-  }
-  if (data.size() > limits.max_data_length) {
+  if (data.size() > limits.max_data_length)
     return invalid("data", "must have at most " + std::to_string(limits.max_data_length) + " bytes");
-  }
   if (!file_) return fail(Fault::unavailable, path_, "the log is closed");
   std::array<std::uint8_t, log_header_size> header{};
   boost::endian::store_big_u32(&header[0], log_sync_word);
@@ -217,9 +215,8 @@ Result<void> EventLogWriter::write(std::int64_t timestamp_us, std::string_view c
   boost::endian::store_big_u32(&header[24], static_cast<std::uint32_t>(data.size()));
   if (std::fwrite(header.data(), 1, header.size(), file_.get()) != header.size() ||
       std::fwrite(channel.data(), 1, channel.size(), file_.get()) != channel.size() ||
-      (!data.empty() && std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size())) {
+      (!data.empty() && std::fwrite(data.data(), 1, data.size(), file_.get()) != data.size()))
     return fail(Fault::unavailable, path_, std::strerror(errno));
-  }
   ++count_;
   return {};
 }

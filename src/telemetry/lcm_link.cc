@@ -118,9 +118,8 @@ Result<void> LcmLink::listen(Handler handler, DatagramCounters& counters, const 
 
 Result<void> LcmLink::publish(const std::string& channel, std::span<const std::uint8_t> data) {
   if (data.size() > std::numeric_limits<unsigned>::max() ||
-      lcm_publish(state_->lcm.get(), channel.c_str(), data.data(), static_cast<unsigned>(data.size())) != 0) {
+      lcm_publish(state_->lcm.get(), channel.c_str(), data.data(), static_cast<unsigned>(data.size())) != 0)
     return fail(Fault::unavailable, channel, "LCM did not publish " + std::to_string(data.size()) + " bytes");
-  }
   return {};
 }
 
@@ -140,12 +139,11 @@ Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
     std::uint64_t count = 0;
     [[maybe_unused]] const ssize_t got = ::read(state.wake_fd, &count, sizeof count);
   }
-  if (state.socket) {
+  if (state.socket)
     return state.socket->receive(
         max_messages, [&](const Sender& sender, const ChannelMessage& message, std::int64_t utime_us) {
           state.handler({message.channel, message.data, utime_us, sender});
         });
-  }
   int handled = 0;
   for (bool more = (waiting[0].revents & POLLIN) != 0; more && handled < max_messages; ++handled) {
     TRY_ASSIGN(more, state.handle_one(waiting[0]));

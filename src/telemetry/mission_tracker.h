@@ -105,7 +105,6 @@ class MissionTracker {
   // recognised. `was_said`: the robot reported its end.
   void recall(OpenMission mission, bool was_said);
 
-  // The mission open now.
   [[nodiscard]] const std::optional<OpenMission>& current() const noexcept { return current_; }
   [[nodiscard]] const MissionCounters& counters() const noexcept { return counters_; }
 

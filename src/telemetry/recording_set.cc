@@ -126,18 +126,16 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
                                      const LogObserver& passed) {
   TRY_ASSIGN(LogRecordings log, read_recordings(paths, robot_id, passed));
   TRY(need_robot(log, robot_id));
-  if (robot_id.empty() && log.robots.size() > 1) {
+  if (robot_id.empty() && log.robots.size() > 1)
     return invalid("log", fmt::format("contains {} robots, {}; select one with --robot-id", log.robots.size(),
                                       listed(log.robots)));
-  }
   Result<RecordingSet> set =
       make_recording_set(robot_id.empty() ? *log.robots.begin() : robot_id, std::move(log.recordings));
   std::string beyond_ranges;
-  for (const auto& [field, beyond] : log.beyond_range) {
+  for (const auto& [field, beyond] : log.beyond_range)
     beyond_ranges +=
         fmt::format("{}{} samples have an impossible {}, up to {:.4g}{}", beyond_ranges.empty() ? "" : "; ",
                     beyond.samples, field, beyond.farthest, in_other_unit(field, beyond.farthest));
-  }
   if (!set) {
     if (!beyond_ranges.empty()) set.error().message += ": " + beyond_ranges;
     if (log.beyond_range.contains("utime")) set.error().field = "utime";

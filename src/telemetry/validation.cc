@@ -78,13 +78,11 @@ std::span<const PlausibleRange> plausible_ranges() noexcept {
 
 std::optional<Implausible> check_plausible(const signals::Sample& sample) noexcept {
   if (auto fault = check_clock(sample.utime_us)) return fault;
-  if (sample.sequence < 0) {
+  if (sample.sequence < 0)
     return Implausible{Implausibility::bad_sequence, "sequence", static_cast<double>(sample.sequence)};
-  }
   const auto values = signals::numbers_of(sample);
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  for (std::size_t i = 0; i < values.size(); ++i)
     if (auto fault = check_value(*values[i], ranges[i], i < wheel_channels)) return fault;
-  }
   return std::nullopt;
 }
 

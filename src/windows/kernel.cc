@@ -34,9 +34,8 @@ Kernel::Kernel(std::span<const double> time_s, std::size_t first, std::size_t la
 
 double Kernel::mean_of_part(std::size_t part, std::span<const double> v) const {
   double total = 0;
-  for (std::size_t k = 0; k < weight_.size(); ++k) {
+  for (std::size_t k = 0; k < weight_.size(); ++k)
     if (part_[k] == part) total += weight_[k] * v[first_ + k];
-  }
   return part_weight_[part] > 0 ? total / part_weight_[part] : 0;
 }
 

@@ -16,9 +16,8 @@ using signals::Sample;
 
 double mean_of_known(const std::vector<double>& v) {
   double sum = 0, known = 0;
-  for (const double value : v) {
+  for (const double value : v)
     if (std::isfinite(value)) sum += value, ++known;
-  }
   return known > 0 ? sum / known : missing;
 }
 
@@ -28,12 +27,10 @@ std::vector<double> smoothed(const std::vector<double>& t, const std::vector<dou
   std::size_t low = 0, high = 0, known = 0;
   double sum = 0;
   for (std::size_t k = 0; k < v.size(); ++k) {
-    for (; high < v.size() && t[high] <= t[k] + half_s + 1e-9; ++high) {
+    for (; high < v.size() && t[high] <= t[k] + half_s + 1e-9; ++high)
       if (std::isfinite(v[high])) sum += v[high], ++known;
-    }
-    for (; t[low] < t[k] - half_s - 1e-9; ++low) {
+    for (; t[low] < t[k] - half_s - 1e-9; ++low)
       if (std::isfinite(v[low])) sum -= v[low], --known;
-    }
     out[k] = known > 0 ? sum / static_cast<double>(known) : missing;
   }
   return out;

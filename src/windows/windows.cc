@@ -285,9 +285,8 @@ class MissionWindows {
     for (std::size_t k = 0; k < updates.at.size();) {
       const double row = std::floor(t[updates.at[k]] / length);
       rows.clear();
-      for (; k < updates.at.size() && std::floor(t[updates.at[k]] / length) == row; ++k) {
+      for (; k < updates.at.size() && std::floor(t[updates.at[k]] / length) == row; ++k)
         if (std::isfinite(track_.battery_power[updates.at[k]])) rows.push_back(updates.at[k]);
-      }
       const bool kept = position++ / kept_together % keep_every == 0;
       if (!kept || rows.empty()) continue;
       auto w = power_row(track_, rows, row * length, length, half);
@@ -356,9 +355,8 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
     }
   }
   std::vector<std::string> differing;
-  for (const auto& [name, values] : names) {
+  for (const auto& [name, values] : names)
     if (values.differ) differing.push_back(name);
-  }
   return differing;
 }
 
