@@ -9,8 +9,7 @@
 namespace joulecast::client {
 
 // A progress line on standard error: redrawn in place on a terminal, never written if standard error is a
-// file or a pipe. It appears after one second, so that short work writes nothing, and the destructor clears
-// it.
+// file or a pipe. It appears after one second; the destructor clears it.
 class Progress : boost::noncopyable {
  public:
   // `work` is the activity ("replaying"), `unit` the counted items ("messages"); total 0: unknown in advance.

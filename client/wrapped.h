@@ -6,8 +6,7 @@
 
 namespace joulecast::client {
 
-// Columns of the terminal that standard output is, 60 to 100; 100 where it is none, so that files are alike
-// everywhere.
+// Columns of the terminal that standard output is, 60 to 100; 100 where it is none, for equal files.
 [[nodiscard]] std::size_t help_width();
 
 // `text` in lines of at most `width` columns, each but the first indented by `indent` blanks. Line breaks of

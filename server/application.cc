@@ -48,8 +48,7 @@
 namespace joulecast {
 namespace {
 
-// Name of the network file system that has the path, or the folder in which it is to be created; empty if it
-// is none or cannot be read.
+// Name of the network file system that has the path, or the folder to create it in; empty: none.
 std::string_view network_file_system(const std::string& path) {
   static constexpr std::pair<std::uint32_t, std::string_view> kinds[] = {
       {NFS_SUPER_MAGIC, "NFS"},    {SMB_SUPER_MAGIC, "SMB"}, {CIFS_SUPER_MAGIC, "SMB"},
@@ -96,8 +95,7 @@ Result<void> take_in_spool(const std::string& path, history::Store& store) {
   return {};
 }
 
-// Runs work on its own thread. False if it has not ended in time; then it continues, and the process can only
-// end by _exit().
+// Runs work on its own thread. False if it did not end in time: it continues, and only _exit() ends all.
 bool within(milliseconds limit, std::function<void()> work) {
   auto done = std::make_shared<std::promise<void>>();
   std::future<void> ended = done->get_future();

@@ -64,8 +64,7 @@ void export_process_metrics(Metrics& metrics);
 void export_robot_metrics(Metrics& metrics, const ingest::FleetView& fleet, const GapWatch& watch,
                           std::function<std::int64_t()> now_utime_us, std::size_t most_robots);
 
-// joulecast_webhook_*: of each webhook, by its number in the file and its host. Both must outlive the
-// metrics.
+// joulecast_webhook_*: of each webhook, by its number in the file and its host. Both outlive the metrics.
 void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks);
 
 }  // namespace joulecast::server

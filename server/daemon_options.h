@@ -73,13 +73,11 @@ Result<server::ClusterOptions> cluster_options(const DaemonOptions& options);
 Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options);
 
 // All errors in the values of the settings that can be detected without opening the store or connecting to a
-// broker: access to the service, the URL of the history, the cluster, accepted senders of telemetry,
-// webhooks, MQTT, robot files.
+// broker, with those of the files that they name.
 std::vector<Error> faults_of(const DaemonOptions& options);
 
 // Without tokens only loopback addresses are permitted, unless http.insecure is set. Fault::invalid on
-// "http.address", "http.allowed_origins" or "http.allowed_hosts"; unsafe settings that are permitted are
-// logged.
+// "http.address", "http.allowed_origins" or "http.allowed_hosts"; permitted unsafe settings are logged.
 Result<void> check_exposure(const DaemonOptions& options);
 
 }  // namespace joulecast

@@ -139,8 +139,7 @@ int care_for_store(const Invocation& invocation) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Histories, spools and backups are accessible to this user and its group only, also with a wider umask of
-  // the caller.
+  // Only this user and its group may access histories, spools and backups, whatever the caller's umask.
   const mode_t allowed = umask(0077);
   umask(allowed | 0007);
   const auto invocation = joulecast::read_settings({argv + 1, argv + argc}, joulecast::process_environment());

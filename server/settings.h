@@ -120,8 +120,7 @@ struct Invocation {
 };
 
 // Reads the command line (without the program's name), the environment ("NAME=value" each) and the file named
-// by --config or JOULECAST_CONFIG. A flag is "--key value" or "--key=value". The error names every faulty
-// value, one a line.
+// by --config or JOULECAST_CONFIG. A flag is "--key value" or "--key=value". Errors: one line for each.
 Result<Invocation> read_settings(const std::vector<std::string>& arguments,
                                  const std::vector<std::string>& environment);
 

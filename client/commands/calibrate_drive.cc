@@ -144,8 +144,7 @@ Result<void> identify(const robot::RobotModel& robot, const CalibrateDriveOption
   return {};
 }
 
-// Every third mission tests what the others identify, as when the daemon adopts a model; with fewer than
-// three all are needed.
+// Every third mission tests the others' fit, as at an adoption; with fewer than three all are needed.
 bool held_out(std::size_t mission, std::size_t missions) {
   return missions >= 3 && mission % 3 == 2;
 }

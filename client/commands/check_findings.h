@@ -32,8 +32,7 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
 // Of a robot's recordings against its file: signs, units, dead, held and constant channels.
 void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings);
 
-// For channels alone: wheels that never turn; and, without a robot file to compare with, fields that never
-// change though the robot moves.
+// For channels alone: wheels that never turn; without a robot file also fields that never change in motion.
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, bool robot_file,
                   Findings& findings);
 

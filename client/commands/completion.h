@@ -15,8 +15,7 @@ struct Candidate {
 };
 
 // Completions of the last of `words`, which are a command line without the program's name, in the order of
-// the help. Files are those of the working directory; ids of robots are requested from the server of the
-// command line.
+// the help. Files are those of the working directory; ids of robots come from its server.
 [[nodiscard]] std::vector<Candidate> candidates(CLI::App& program, const std::vector<std::string>& words);
 
 }  // namespace joulecast::client

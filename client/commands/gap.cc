@@ -223,8 +223,7 @@ void print_adopted_version(const Json& adoption, const std::string& unit) {
     fmt::print("adopted as model version {}\n", adoption["model_version"].get<std::int64_t>());
 }
 
-// Starts a diagnosis of a daemon's own history of a robot, follows the job and prints its result. An
-// interrupt cancels the job.
+// Starts a daemon's diagnosis of a robot, follows the job and prints its result. An interrupt cancels it.
 Result<Exit> gap_from_server(const GapOptions& options) {
   const Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
   TRY_ASSIGN(const auto begun, ask(options.server, HttpMethod::post, "/v1/diagnoses", wanted.dump(),

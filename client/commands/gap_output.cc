@@ -117,8 +117,7 @@ void print_gap(const Json& d) {
   if (!others.empty()) fmt::print("error of other readings (noise floor): {}\n", others);
 }
 
-// The terms of a linear regression of the power: in the data, in the model, and in the model with what was
-// found.
+// Terms of a linear regression of power: in the data, in the model, and in the one with the effects found.
 void print_terms(const Json& d) {
   const Json& baseline = member_at(d, "baseline");
   if (!baseline.is_object()) return;

@@ -5,8 +5,7 @@
 
 namespace joulecast::client {
 
-// Help with lines that fit the terminal, names of the options' values, and defaults after the meaning of an
-// option.
+// Help with lines that fit the terminal, names of the options' values, and defaults after the meanings.
 class HelpFormatter : public CLI::Formatter {
  public:
   explicit HelpFormatter(std::size_t width) : width_(width) {

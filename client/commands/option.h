@@ -96,8 +96,7 @@ CLI::Option* add_option(CLI::App& command, const std::string& name, M& member, c
   return option;
 }
 
-// A member of the request, or a parameter of the query, that an option gives, into the member `given` of the
-// options (server_answer.h).
+// A member of the request, or a parameter of the query, put into the options' `given` (server_answer.h).
 template <class V>
 struct Sent {
   const char* member;
@@ -137,8 +136,7 @@ class Row {
 void add_examples(CLI::App& command, const char* examples);
 
 // Adds a command that parses into an Options of its own and then runs. An error of `run` is printed and gives
-// the exit code. Every line of `examples` is tested with the placeholders amr.json, amr.lcmlog, history.db
-// and the like.
+// the exit code. Every line of `examples` is tested with placeholders such as amr.json and history.db.
 template <class Options>
 CLI::App* add_command(CLI::App& parent, Exit& exit, const char* name, const char* help,
                       Result<Exit> (*run)(Options&), const std::vector<Row<Options>>& rows,
@@ -161,8 +159,7 @@ CLI::App* add_command(CLI::App& parent, Exit& exit, const char* name, const char
 // The flag --example: prints a request that the command accepts, and exits.
 void add_example(CLI::App& command, const char* request);
 
-// Microseconds since the Unix epoch, from a whole number of them or from UTC as 2024-07-18T09:10:45[.5]Z; an
-// error names `option`.
+// Microseconds since 1970, from such a number or from UTC as 2024-07-18T09:10:45[.5]Z; errors name `option`.
 [[nodiscard]] Result<std::int64_t> parse_time(const std::string& text, const std::string& option);
 
 // The exclusive end of a period; for a date alone the next midnight, so that the period includes that day.

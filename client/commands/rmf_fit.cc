@@ -58,8 +58,7 @@ Steps steps_of(const RmfTelemetry& t, double wheel_radius_m, double half_track_m
   return steps;
 }
 
-// What a drive's energy is linear in: mass, inertia, friction force, ambient power and, if `turns`, the
-// angle.
+// A drive's energy is linear in: mass, inertia, friction force, ambient power and, if `turns`, the angle.
 Eigen::VectorXd terms_of(const RmfDrive& d, bool turns) {
   Eigen::VectorXd terms(turns ? 5 : 4);
   terms.head(4) << d.speeding, d.swerving, d.distance_m, d.duration_s;
@@ -95,8 +94,7 @@ RmfError error_by(std::span<const std::vector<RmfDrive>> missions,
   return error;
 }
 
-// "  mass: 55.0  # kg": the key, and the place of the value in the line; without a value for
-// "mechanical_system:".
+// "  mass: 55.0  # kg": the key, and the place of the value; none for "mechanical_system:".
 struct YamlLine {
   std::string_view key;
   std::size_t value_begin = 0, value_end = 0;

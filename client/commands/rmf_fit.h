@@ -75,17 +75,14 @@ struct RmfFit {
 };
 
 // Least squares with coefficients of at least zero, the energy of each drive weighted by one over its
-// duration. `capacity_ah` is that of the robot file; the voltage is energy over charge. Error: fewer than 6
-// missions.
+// duration. `capacity_ah`: the robot file's; the voltage is energy over charge. Error: fewer than 6 missions.
 [[nodiscard]] Result<RmfFit> fit_rmf(const std::vector<std::vector<RmfDrive>>& missions, double capacity_ah,
                                      const std::optional<RmfParameters>& before);
 
-// The values of a fleet configuration in YAML. Error: one of them is missing, or not a number on a line of
-// its own.
+// The values of a fleet configuration in YAML. Error: one is missing, or no number on a line of its own.
 [[nodiscard]] Result<RmfParameters> read_rmf_configuration(const std::string& yaml);
 
-// The configuration with the values replaced; all else, comments included, as before. A charging current that
-// is not known stays.
+// The configuration with the values replaced, comments kept. An unknown charging current stays.
 [[nodiscard]] std::string with_rmf_parameters(const std::string& yaml, const RmfParameters& parameters);
 
 }  // namespace joulecast::client

@@ -95,8 +95,7 @@ std::string numbered(const std::string& kind, std::size_t index) {
   return kind + "-" + number;
 }
 
-// Which robots: the given files (each once under its own id when no more robots are wanted), or the shipped
-// kinds in turn.
+// The given files (each once under its own id where no more robots are wanted), or the shipped kinds in turn.
 Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
   TRY_ASSIGN(auto effects, parse_effects(options.effects));
   TRY_ASSIGN(const auto imperfections, vr::make_imperfections(effects));
@@ -257,8 +256,7 @@ std::vector<vr::SimulationSpec> timed_specs(const std::vector<FleetMember>& memb
   for (const FleetMember& member : members) specs.push_back(member.spec);
   std::int64_t start_us = log_start_utime_us;
   if (over_lcm) {
-    // Robots with a faster clock start in the past, so that their last stamp is equal to the time at which it
-    // is sent.
+    // Robots with a faster clock start in the past, so that their last stamp is the time at which it is sent.
     const double ahead_s = options.speed > 1 ? (1 - 1 / options.speed) * length_s(specs, options) : 0;
     start_us = host_utime_us() - std::llround(1e6 * ahead_s);
   }
@@ -283,8 +281,7 @@ struct Published {
   double robot_time_s = 0;
 };
 
-// Publishes messages in the order of their time, over LCM at the requested speed, until the end, the duration
-// or ctrl-C.
+// Publishes messages in order of time, over LCM at the given speed, until the end, the duration or ctrl-C.
 Result<Published> publish(vr::Fleet& fleet, std::int64_t start_us, const SimulateOptions& options,
                           Outlets& outlets) {
   InterruptGuard interrupt;

@@ -18,8 +18,7 @@
 #include "client/commands/table.h"
 
 // The command token: creates and revokes the tokens of joulecastd's auth.token_file. It writes the file, not
-// the store, which a running daemon locks; it works with and without a running daemon, and the first token
-// requires none.
+// the store, which a running daemon locks; it works with and without one, and the first token requires none.
 namespace joulecast::client {
 namespace {
 

@@ -18,8 +18,7 @@ struct ShippedRobot {
 };
 [[nodiscard]] std::span<const ShippedRobot> shipped_robots();
 
-// A floor drawn at random: where its bad patch lies, which way it tilts, which side of the robot is the weak
-// one.
+// A floor drawn at random: where its bad patch is, which way it tilts, which side of the robot is weak.
 [[nodiscard]] World draw_world(Rng& rng, double map_half_width_m);
 
 // Several robots on one map and one clock; messages come in order of time, ties in order of the robots.
@@ -34,8 +33,7 @@ class Fleet {
   // Empty when every robot has done its missions.
   [[nodiscard]] std::optional<Message> next();
 
-  // The events that end every running mission, at the time of its robot's last message. The fleet is done
-  // then.
+  // The events that end every running mission, at its robot's last message. The fleet is done then.
   [[nodiscard]] std::vector<Message> abort();
 
   std::size_t size() const { return robots_.size(); }

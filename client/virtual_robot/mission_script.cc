@@ -19,8 +19,7 @@ double draw_payload(const RobotParameters& robot, Rng& rng) {
   return robot.payload_limit_kg * payload_fractions[rng.index(payload_fractions.size())];
 }
 
-// Speeds and accelerations over the robot's whole permitted range, so that friction laws, inertia and losses
-// leave different marks.
+// Speeds and accelerations over the whole permitted range, to separate friction laws, inertia and losses.
 struct Pace {
   double speed_m_s, acceleration_m_s2;
 };

@@ -146,8 +146,7 @@ void SpeedController::set_payload(double declared_kg) {
       robot_.wheel_inertia_kg_m2 + 0.5 * mass_kg * robot_.wheel_radius_m * robot_.wheel_radius_m;
   turning_inertia_ = robot_.wheel_inertia_kg_m2 + 0.5 * yaw_kg_m2 * lever * lever;
 
-  // The loop is w' = -a w + b V about a steady speed; poles twice at the natural frequency where V makes that
-  // possible.
+  // The loop is w' = -a w + b V about a steady speed; poles twice at the natural frequency where V allows it.
   const double inertia = std::min(straight_inertia_, turning_inertia_);
   const double a = torque_per_a_ * emf_per_rad_s_ / (robot_.resistance_ohm * inertia);
   const double b = torque_per_a_ / (robot_.resistance_ohm * inertia);

@@ -154,8 +154,7 @@ double Plant::driver_power_w(double motor_power_w) const {
   return drawn + effect_.driver_loss * std::abs(motor_power_w);
 }
 
-// Forces on the body, positive against forward motion and against a turn to the left, with the power they
-// take.
+// Forces on the body, positive against forward motion and against a turn to the left, with their power.
 Plant::Body Plant::body(const PlantState& s, double v, double yaw, PlantAccounts& power) const {
   const double drag_n = effect_.aerodynamic_drag * v * std::abs(v);
   double slope_n = effect_.slope == 0 ? 0
@@ -217,8 +216,7 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
     if (effect_.x_oval_wheel != 0)
       internal_nm += effect_.x_oval_wheel * dry_nm_[side] * std::sin(s.wheel_angle_rad[side]);
 
-    // Torque that the gear transmits, after friction ahead of it: driving x = tau (1 + a), braking x = tau (1
-    // - a).
+    // Torque that the gear transmits, after friction ahead: x = tau (1 + a) driving, tau (1 - a) braking.
     const double motor_nm = torque_per_a_ * i;
     double mesh_nm = 0;
     double slip_nm = 0;

@@ -89,8 +89,7 @@ T moved(const T& from, const T& rate, double by) {
 
 // The body, wheels and motors of a differential-drive robot, driven by the two armature voltages.
 // Equations of motion from the kinetic energy of body and wheels without lateral slip, with the centre of
-// mass off the axle, wheels of unequal radius and armature inductance; Runge-Kutta of order four at a fixed
-// step.
+// mass off the axle, wheels of unequal radius and armature inductance; Runge-Kutta of order four.
 class Plant {
  public:
   Plant(const RobotParameters& robot, const Imperfections& imperfections, const World& world);
@@ -170,8 +169,7 @@ class Plant {
   double longest_step_s_ = 0;
 };
 
-// Battery: open-circuit voltage by charge, ohmic resistance and one resistor-capacitor branch for the slow
-// sag.
+// Battery: open-circuit voltage by charge, ohmic resistance and a resistor-capacitor branch for slow sag.
 class Pack {
  public:
   // resistance_error: fraction by which both resistances exceed the file's.

@@ -16,8 +16,7 @@ struct Truth {
   std::vector<MissionTruth> missions;
 };
 
-// The injected truth as JSON: per robot its effects with strengths, the world's shapes, and per
-// mission the true energies [J].
+// The injected truth as JSON: per robot its effects, the world's shapes, and true energies per mission [J].
 [[nodiscard]] std::string truth_json(const std::vector<Truth>& truths);
 
 }  // namespace joulecast::virtual_robot

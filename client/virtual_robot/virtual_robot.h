@@ -75,8 +75,7 @@ struct Witness {
 };
 
 // One robot at work: pilot, controller, plant, battery and sensors on one clock. Each call runs to its next
-// message, so that a fleet in real time and a batch use the same code. The same spec and seed give the same
-// messages, bit for bit.
+// message, in real time and in batches. The same spec and seed give the same messages, bit for bit.
 class VirtualRobot {
  public:
   VirtualRobot(const SimulationSpec& spec, std::uint64_t seed);

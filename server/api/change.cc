@@ -107,8 +107,7 @@ Result<std::optional<Response>> IdempotencyKeys::known(const Request& request) c
                  "must be new for each request that is new");
 }
 
-// Requests that change something are handled one by one (Run::write), so that another one of the same key can
-// only be another daemon's.
+// Changing requests are handled one by one (Run::write): another one of the same key is another daemon's.
 Result<Response> IdempotencyKeys::answer(const Request& request, const http::Handler& handler) const {
   request.kept.idempotency_key = trimmed(request.header(http::idempotency_header));
   if (request.kept.idempotency_key.empty()) return handler(request);

@@ -14,12 +14,10 @@
 
 namespace joulecast::api {
 
-// The change that a request makes: one transaction with its entry in the audit and, under its idempotency
-// key, its answer.
+// The change that a request makes: a transaction with its audit entry and, under a key, its answer.
 class RequestChange {
  public:
-  // From the outcome of the change. Called on the writer's thread: it refers to nothing that ends before the
-  // services.
+  // From the outcome of the change. Called on the writer's thread: refers to nothing that ends before it.
   using Answer = std::function<Response(std::int64_t outcome)>;
 
   RequestChange(const Services& services, const Request& request) : services_(services), request_(request) {}
@@ -51,8 +49,7 @@ class IdempotencyKeys {
     std::function<Result<std::optional<history::RequestAnswer>>(const std::string& actor,
                                                                 const std::string& key)>
         find;
-    // Keeps the answer of a request that changed nothing, which its handler did not keep; returns when it is
-    // kept, or cannot be.
+    // Keeps the answer of a request that changed nothing; returns when it is kept, or cannot be.
     std::function<void(history::RequestAnswer)> keep;
     std::chrono::milliseconds wait{0};  // for another daemon that is handling a request of the same key
   };

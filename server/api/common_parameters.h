@@ -19,8 +19,7 @@
 // Parameters that several endpoints share.
 namespace joulecast::api {
 
-// The {id} of a path, or its {`name`}, as the positive integer that names a `thing`. Fault::not_found for any
-// other text.
+// The {id} of a path, or its {`name`}, as the positive integer of a `thing`. Fault::not_found for other text.
 Result<std::int64_t> path_id(const http::Request& request, std::string_view thing,
                              const std::string& name = "id");
 
@@ -49,8 +48,7 @@ void write_item(JsonWriter& json, const Item& item, const Write& write) {
     write.write(json, item);
 }
 
-// A page of a list: the members that `head` writes, the items by `write`, and "next_cursor", null where
-// `cursor` is empty.
+// A page: the members that `head` writes, the items by `write`, "next_cursor", null for an empty `cursor`.
 template <class Items, class Write>
 http::Response page_response(
     std::string_view name, const Items& items, const Write& write, std::string_view cursor,
@@ -83,8 +81,7 @@ std::pair<std::vector<std::string>, std::string> page_of_ids(const http::Request
                                                              const std::set<std::string>& ids,
                                                              std::int64_t limit);
 
-// Of a log of events or requests: ?kind= with `kinds`, ?order= with its default, ?from=, ?to=, ?limit= and
-// ?cursor=.
+// Of a log of events or requests: ?kind= with `kinds`, ?order= and default, ?from=, ?to=, ?limit=, ?cursor=.
 std::vector<http::Parameter> log_parameters(std::string kinds, std::string_view usual_order);
 // These and ?robot_id= as the query of the store.
 struct LogQuery {

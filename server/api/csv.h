@@ -26,8 +26,7 @@ class Csv {
   Csv& field(std::int64_t number);
   Csv& field(bool truth) { return field(truth ? "true" : "false"); }
   void end_row();
-  // A row of an item's JSON. Null is an empty field, texts of an array are separated by blanks, an object is
-  // JSON.
+  // A row of an item's JSON. Null: an empty field; an array: texts with blanks between; an object: JSON.
   void row(const std::string& item);
 
   // `name` is the file's name without its extension.

@@ -96,8 +96,7 @@ const described::Input<Annulment>& annulment_input() {
   return input;
 }
 
-// Excludes an ended mission from all sums and from the training of forecasts. It remains in the lists, with
-// the reason.
+// Excludes an ended mission from all sums and from the training of forecasts. Lists keep it, with the reason.
 Result<Response> annul(Services& services, const Request& request) {
   TRY_ASSIGN(const auto [reason], annulment_input().read(*request.json));
   TRY_ASSIGN(history::Mission mission, mission_of(services, request));

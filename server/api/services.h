@@ -76,8 +76,7 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
   };
 }
 
-// The table of the endpoints of a file: what each of them has, the function that answers it, and the other
-// members of its row.
+// The endpoints of a file: the common members, the answering function, and the other members of each row.
 struct Rows : std::vector<TableRow> {
   template <class Answer>
   void add(Method method, std::string path, std::string operation_id, Role role, std::string summary,

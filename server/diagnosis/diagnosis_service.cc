@@ -73,8 +73,7 @@ bool is_held_back(std::size_t index, std::size_t count, double share) {
   return std::floor((k + 1) * share + 1e-9) > std::floor(k * share + 1e-9);
 }
 
-// Result, summary, report and model of a diagnosis; the model's text is empty where there is nothing to
-// adopt.
+// Result, summary, report and model of a diagnosis; the model is empty where there is nothing to adopt.
 ordered_json told_of(const DiagnosisRecord& record, const gap::Diagnosis& diagnosis,
                      const telemetry::RecordingSet& recordings, const ingest::ModelInForce& model,
                      std::optional<std::int64_t> since_utime_us, const std::string& made_at) {
@@ -374,8 +373,7 @@ void DiagnosisService::end_record(DiagnosisRecord& record, DiagnosisState state,
 void DiagnosisService::finish(Job& job, DiagnosisState state, std::string error, std::string report) {
   const DiagnosisRecord& record = job.record;
   end_record(job.record, state, std::move(error));
-  // The result is in the store before the job leaves the queue, so that it is always found in one of
-  // them.
+  // The result is in the store before the job leaves the queue, so that one of them always has it.
   history::UpdateDiagnosis update{record, std::move(report)};
   if (const auto stored = parts_.writer.execute(update); !stored) {
     parts_.on_error(stored.error());

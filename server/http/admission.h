@@ -21,8 +21,7 @@ struct Denial {
   std::string detail;
 };
 
-// Looks at a head before its body is read. A denied request's connection closes, since where its body ends
-// may be unknown.
+// Looks at a head before its body is read. Denying closes the connection: the end of the body may be unknown.
 class Admission {
  public:
   // The accepted names in addition to IP addresses, localhost and this host's name; "*" accepts any name.

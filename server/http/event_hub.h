@@ -40,8 +40,7 @@ class EventHub {
   // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
   // select (a robot's id; empty goes to all).
   void publish(std::string_view event, std::string_view data, std::string_view topic = {});
-  // The same, for events that outdate earlier ones of the same event and topic: a client that reads slowly
-  // gets the newest of them alone.
+  // The same, of events that outdate earlier ones of their topic: a slow client gets the newest alone.
   void publish_newest(std::string_view event, std::string_view data, std::string_view topic);
 
   // An event stream of one client; an empty topic selects everything. Beyond max_subscribers the oldest of
@@ -50,8 +49,7 @@ class EventHub {
   Result<std::shared_ptr<StreamSource>> subscribe(std::string_view last_event_id = {},
                                                   std::string_view topic = {}, std::string_view client = {});
 
-  // Response of content type text/event-stream around subscribe(), honouring the request's Last-Event-ID
-  // header.
+  // text/event-stream around subscribe(), honouring the request's Last-Event-ID header.
   Result<Response> respond(const Request& request, std::string_view topic = {});
 
   Counts counts() const;

@@ -41,8 +41,7 @@ class Gate {
     std::function<std::int64_t()> now_utime_us = {};
     // Keeps an event; an error means that it is not and will not be kept. Must not block.
     std::function<Result<void>(AccessEvent)> audit = {};
-    // Called with an event that has already happened and that `audit` failed to store; any thread. Empty: not
-    // reported.
+    // Called with an event that happened and that `audit` failed to store; any thread. Empty: not reported.
     std::function<void(const AccessEvent&, const Error&)> not_audited = {};
   };
 

@@ -107,8 +107,7 @@ class HttpServer {
   // The port really bound.
   std::uint16_t port() const;
 
-  // Reads the certificate and key again, for connections from now on; on an error the old ones stay. Any
-  // thread.
+  // Reads the certificate and key again, for further connections; on an error the old ones stay. Any thread.
   Result<void> reload_tls();
 
   // Time since the I/O thread last ran its tick (every 100 ms), for a watchdog. Any thread.
@@ -119,8 +118,7 @@ class HttpServer {
   // the deadline; false if requests had to be cut off.
   bool stop(std::chrono::milliseconds deadline);
 
-  // Nothing runs any more. After a stop only a handler that does not heed its token delays it; the destructor
-  // waits for it.
+  // Nothing runs any more. After a stop only a handler that ignores its token delays it; destruction waits.
   bool ended() const;
 
  private:

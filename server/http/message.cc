@@ -31,8 +31,7 @@ class Generator : public StreamSource {
     try {
       return next_(out, left_.get_token()) ? Next::more : Next::end;
     } catch (...) {
-      // The head has been sent with status 200; only a broken connection can indicate the error to the
-      // client.
+      // The head has been sent with status 200; only a broken connection can indicate the error.
       return Next::abort;
     }
   }

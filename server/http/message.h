@@ -57,8 +57,7 @@ struct Request {
   const std::string& param(std::string_view name) const;
   // Decoded query value, or nullopt when the key is absent.
   std::optional<std::string_view> query_value(std::string_view name) const;
-  // Query values that the router has checked against the declared type and bounds of the endpoint's
-  // parameter.
+  // Query values that the router has checked against the endpoint's types and bounds.
   std::optional<double> query_number(std::string_view name) const;
   std::optional<std::int64_t> query_integer(std::string_view name) const;
   std::optional<bool> query_boolean(std::string_view name) const;

@@ -108,8 +108,7 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   return statuses;
 }
 
-// The role is listed with each security scheme: OpenAPI 3.1 allows roles there for schemes that are not
-// OAuth2.
+// The role is listed with each security scheme: OpenAPI 3.1 allows them also without OAuth2.
 ordered_json security_of(Role role) {
   if (role == Role::open) return ordered_json::array();
   const ordered_json roles = ordered_json::array({access::name(role)});

@@ -33,8 +33,7 @@ described::Schemas operations_schemas();
 // GET /v1/events: the live fleet as server-sent events; ?robot_id= selects one robot.
 Endpoint events_endpoint(EventHub& hub);
 
-// Counts the server's events. Labels are bounded: operations come from the table of endpoints, statuses from
-// the code that answers.
+// Counts the server's events. Labels are bounded: operations of the table of endpoints and their statuses.
 class HttpMetrics : public ServerObserver {
  public:
   // The table lives as long as the router, which outlives this.

@@ -19,13 +19,11 @@ std::string_view reason_phrase(unsigned status);
 
 described::Schema problem_schema();
 
-// RFC 9457 document; `request_id`, `field` and `constraint` are left out when empty. Answers of status 429
-// and 503 carry Retry-After.
+// RFC 9457 document, without empty `request_id`, `field` and `constraint`. 429 and 503 have Retry-After.
 Response problem(unsigned status, std::string_view slug, std::string_view detail, std::string_view request_id,
                  std::string_view field = {}, std::string_view constraint = {});
 
-// The problem of an error. Faults of ours (internal, corrupt) name no detail to the client beyond the request
-// id.
+// The problem of an error. Faults of ours (internal, corrupt) state no detail beyond the request id.
 Response problem(const Error& error, std::string_view request_id);
 
 }  // namespace joulecast::http

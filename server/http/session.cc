@@ -192,8 +192,7 @@ void Session::begin_request() {
   if (!cut_) state_ = State::idle;
 }
 
-// Parses the received bytes, one request at a time, so that answers are sent in the order of the requests.
-// False if the request is refused.
+// Parses the received bytes, one request at a time: answers keep their order. False if it is refused.
 bool Session::parse() {
   const ServerOptions& limits = core_->options;
   while (buffer_.size() > 0 && !parser_->is_done()) {
@@ -303,8 +302,7 @@ void Session::fill_request() {
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);
 }
 
-// The connection ends after a refusal: the beginning of the next request and the result of this one are
-// unknown. Returns false.
+// Returns false: the connection ends, since the next request's beginning and this one's result are unknown.
 bool Session::refuse(Refusal refusal, unsigned status, std::string_view slug, std::string_view detail) {
   core_->observer.refused(refusal);
   if (received_ == Clock::time_point{}) {

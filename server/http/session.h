@@ -1,7 +1,6 @@
 #pragma once
 
-// Private to server/http: state shared by sessions and the server. Everything runs on the I/O thread unless
-// stated.
+// Private to server/http: state shared by sessions and the server. All runs on the I/O thread unless stated.
 #include "server/http/asio.h"
 // asio.h stays first.
 #include <algorithm>
@@ -62,8 +61,7 @@ class WorkerPool {
   WorkerPool(unsigned threads, std::size_t capacity) : capacity_(capacity), threads_(std::max(threads, 1U)) {}
   ~WorkerPool() { threads_.join(); }  // runs queued tasks first
 
-  // False when the queue is full; `admitted`, for the next piece of work that has begun, is never refused.
-  // Any thread.
+  // False when the queue is full; `admitted`, the next piece of begun work, is never refused. Any thread.
   bool submit(std::function<void()> task, bool admitted = false);
 
  private:

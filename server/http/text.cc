@@ -7,8 +7,7 @@ bool is_digit(char c) {
   return c >= '0' && c <= '9';
 }
 
-// Adds one to the last digit of [begin, end), a decimal with at most one point; true when a digit was carried
-// beyond the first.
+// Adds one to the last digit of [begin, end), a decimal with at most one point; true: the first one carries.
 bool carry(char* begin, char* end) {
   for (char* at = end; at != begin;) {
     --at;

@@ -219,8 +219,7 @@ void BrokerLink::stop() {
   mosquitto_lib_cleanup();
 }
 
-// The library's own thread ends permanently at the first fault of TLS or of its protocol, for example when
-// the broker is killed.
+// The library's own thread ends at the first fault of TLS or protocol, such as a killed broker.
 void BrokerLink::run(int code) {
   std::chrono::seconds pause = first_pause;
   for (;;) {

@@ -27,16 +27,14 @@ struct BrokerOptions {
   std::string authorities;  // PEM file; empty: those of the system
   std::string user, password;
   std::string client_id;
-  // Will message: the broker publishes it on that topic, retained, when this daemon disappears without a
-  // disconnect.
+  // Will message: the broker publishes it on that topic, retained, if the daemon vanishes.
   std::string last_topic, last_words;
 };
 
 // mqtt://host[:port] (1883) or mqtts://host[:port] (8883, by TLS). Fault::invalid on `field`.
 Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string& field);
 
-// A connection to an MQTT 3.1.1 broker, made again whenever it is lost (after 1 s, and up to 60 s later). Any
-// thread.
+// A connection to an MQTT 3.1.1 broker, made again when it is lost (after 1 s to 60 s). Any thread.
 class BrokerLink {
  public:
   // `on_change(text)` is called with an empty text when the connection is made, and with the reason when it
@@ -45,8 +43,7 @@ class BrokerLink {
       : options_(std::move(options)), on_change_(std::move(on_change)) {}
   ~BrokerLink() { stop(); }
 
-  // Fault::invalid where the broker's name or the certificate authorities are unusable; an unreachable broker
-  // is no fault.
+  // Fault::invalid where the broker's name or the authorities are unusable; not for an unreachable broker.
   Result<void> start();
   bool is_connected() const { return connected_; }
   // Fault::unavailable without a connection; the message is not queued.

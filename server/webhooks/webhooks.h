@@ -29,8 +29,7 @@ struct Webhook {
 // "webhooks.file" and contain the JSON pointer.
 Result<std::vector<Webhook>> read_webhooks(const std::string& path);
 
-// Every kind that there is, in order of the alphabet: those of the event log and "mission", a mission that
-// ended.
+// Every kind that there is, in order of the alphabet: those of the event log and "mission", one that ended.
 const std::set<std::string>& event_kinds();
 
 // Sends events to webhooks: POST of

@@ -13,12 +13,10 @@
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
 
-// The content of a file. Fault::invalid where every user of the machine may write it or, if it is secret,
-// read it.
+// The content of a file. Fault::invalid where every user may write it or, if it is secret, read it.
 Result<std::string> read_guarded_file(const std::string& path, bool secret,
                                       std::size_t max_bytes = max_text_file_bytes);
-// That of a secret file without the whitespace around it; Fault::invalid also where fewer than `least` bytes
-// remain.
+// That of a secret file without the whitespace around it; Fault::invalid also below `least` bytes.
 Result<std::string> read_secret(const std::string& path, std::size_t least);
 
 // Changes with a file's content, permissions and replacement.

@@ -37,8 +37,7 @@ inline constexpr std::string_view secret_prefix = "jc_";
 // A new secret, the prefix and 64 hexadecimal digits: 256 random bits.
 std::string new_secret();
 
-// The token of that secret, compared with every one in constant time; null when none is. Expired ones are
-// found too.
+// The token of that secret, compared with every one in constant time; null when none is. Also expired ones.
 const Token* find_token(const std::vector<Token>& tokens, std::string_view secret);
 
 bool has_expired(const Token& token, std::int64_t now_utime_us);
@@ -47,8 +46,7 @@ bool is_for_robot(const Token& token, const std::string& robot_id);
 // 1 to 64 of the letters, digits and "._-@".
 Result<void> check_token_name(std::string_view name);
 
-// The file of tokens: {"tokens": [{"name", "role", "robots", "created", "expires", "sha256"}]}. Errors name
-// the member.
+// The file: {"tokens": [{"name", "role", "robots", "created", "expires", "sha256"}]}. Errors name the member.
 Result<std::vector<Token>> parse_tokens(std::string_view json_text);
 std::string to_json_text(const std::vector<Token>& tokens);
 

@@ -142,8 +142,7 @@ bool paces_stated(const AutonomyInput& input, const TaskPlan& plan) {
   return true;
 }
 
-// Where the motors do not move the robot, or else do not reach the pace: of the whole request before those of
-// its tasks.
+// Where the motors do not move the robot, or do not reach the pace: of the whole request, then of its tasks.
 std::optional<forecast::Limitation> limitation_of(const AutonomyInput& input, const TaskPlan& plan,
                                                   const forecast::LegPricer& pricer,
                                                   const RobotOutlook& robot, const AutonomyOutput& out) {

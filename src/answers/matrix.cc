@@ -28,8 +28,7 @@ using planning::Obstacle;
 constexpr std::size_t threads = 2;
 constexpr double confidence = 0.95;  // of a task list's reserve in autonomy, by default
 
-// The least charge, in hundredths, whose probability suffices; NaN where none does. `probability` rises with
-// the charge.
+// The least charge, in hundredths, that suffices; NaN: none does. `probability` rises with the charge.
 template <class Probability>
 double charge_that_suffices(Probability&& probability) {
   int low = 0, high = 101;
@@ -406,8 +405,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
   return cells;
 }
 
-// The probability that a robot driving by minimum-energy profiles ends each task with its reserve, and the
-// charge with which it does.
+// The probability that a robot ends each task with its reserve by minimum energy, and the charge for it.
 void Matrix::State::state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const {
   const auto possible = std::ranges::find_if(cells, [](const Cell& c) { return c.duration_s > 0; });
   const double standing_w = robot.model->drive.battery_power_for({0, 0});

@@ -61,8 +61,7 @@ struct MatrixRow {
   bool siblings_pending = false;  // of forecasts, as in RobotOutlook
 };
 
-// Every robot on every task. A problem of one robot, such as an unknown robot or position, is stated in its
-// row.
+// Every robot on every task. A problem of one robot, such as an unknown position, is in its row.
 class Matrix {
  public:
   Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables);

@@ -13,8 +13,7 @@
 
 namespace joulecast::answers {
 
-// A plan with less than this relative excess over the shortest time counts as fastest: ten times the
-// planner's tolerance of deadlines.
+// A plan with less than this relative excess over the shortest time is fastest: ten times the tolerance.
 inline constexpr double at_the_limit = 1e-3;
 
 struct ProfileInput {
@@ -37,8 +36,7 @@ struct ProfileOutput {
   std::vector<planning::PlanCost> pareto;
 };
 
-// The minimum-energy motion along the path within the limits, against a trapezoid and a triangle. A stop ends
-// planning with Fault::stopped.
+// The minimum-energy motion along the path, against a trapezoid and a triangle. Fault::stopped on a stop.
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
                               const std::stop_token& stop = {});
 

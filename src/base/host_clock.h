@@ -31,8 +31,7 @@ class ClockSteps {
   explicit ClockSteps(Clock wall_us = host_utime_us, Clock steady_us = host_boot_us)
       : wall_us_(std::move(wall_us)), steady_us_(std::move(steady_us)), offset_us_(offset_us()) {}
 
-  // Returns the step of the clock since the last call, positive forward; 0 for a difference that slewing
-  // explains.
+  // Returns the step of the clock since the last call, positive forward; 0 where slewing explains it.
   std::int64_t take_step_us() {
     const std::int64_t before_us = std::exchange(offset_us_, offset_us());
     const std::int64_t step_us = offset_us_ - before_us;

@@ -7,8 +7,7 @@
 
 namespace joulecast {
 
-// A number of an answer that may be unknown: null where it is not finite. For .cc files alone; other headers
-// take json_fwd.hpp.
+// A number that may be unknown: null where it is not finite. For .cc files; headers take json_fwd.hpp.
 inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(resolved(value)) : nlohmann::json(nullptr);
 }

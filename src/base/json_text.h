@@ -10,8 +10,7 @@
 namespace joulecast {
 
 // Strict JSON: one value, UTF-8, no repeated keys in an object, no nesting deeper than `max_depth`.
-// The error's field is the JSON pointer of the object with a repeated key, else empty; its message names the
-// byte.
+// An error's field: the JSON pointer of the object with a repeated key, else empty; its message: the byte.
 Result<nlohmann::json> parse_json(std::string_view text, std::size_t max_depth = 64);
 
 }  // namespace joulecast

@@ -71,8 +71,7 @@ class JsonWriter {
     return end_array();
   }
 
-  // An array of numbers rounded to `places` decimals: series for people and planners, where the digits behind
-  // are noise.
+  // An array of numbers rounded to `places` decimals: series in which the digits behind are noise.
   JsonWriter& column(std::string_view name, std::span<const double> numbers, int places = 6);
 
   std::string take() { return std::move(text_); }

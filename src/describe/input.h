@@ -25,8 +25,7 @@ struct Count {
   std::string_view noun = "entries";
 };
 
-// The array; null, and a fault, where it is none or has another number of items. An absent one is a fault if
-// it is required.
+// The array; null, and a fault, where it is none, has another number of items, or is absent and required.
 const nlohmann::json* read_array(Fields& fields, std::string_view name, const Count& count,
                                  Presence presence);
 

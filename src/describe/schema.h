@@ -8,8 +8,7 @@
 #include <utility>
 #include <vector>
 
-// A member, a member of a member, or the result of a function of one, as a function of an object:
-// AT(record.id).
+// A member, a member's member, or the result of its function, as a function of an object: AT(record.id).
 #define AT(path) [](auto& object) -> decltype(auto) { return (object.path); }
 
 // Parts of JSON Schemas (2020-12), with the order of their members kept.
@@ -58,8 +57,7 @@ Schema or_null(Schema schema, bool with_reference = false);
 // The schema with its description, and what `limits` adds.
 Schema with_words(Schema schema, std::string_view words, const Schema& limits = Schema::object());
 
-// Of a value that JsonWriter::value() writes. A double that is not finite is null: see
-// Table::number_or_null().
+// Of a value that JsonWriter::value() writes. For doubles that may be null: Table::number_or_null().
 template <class T>
 Schema of_value(bool or_null = false) {
   if constexpr (is_optional<T>)

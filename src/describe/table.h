@@ -233,8 +233,7 @@ class Table {
     properties_[name] = with_words(std::move(schema), words);
     return *this;
   }
-  // The members of another table, in this object. With `words` their schemas are references into the
-  // document.
+  // The members of another table, in this object. With `words` their schemas are references.
   template <class Get, class Inner>
   Table& include(const Table<Inner>& table, Get get, std::string_view words = {}) {
     required_.insert(required_.end(), table.required().begin(), table.required().end());

@@ -25,8 +25,7 @@ struct ActiveEffect {
 ActiveEffect initial(const Effect& effect);
 
 // Reads an adopted effect; unknown ids, unknown or missing parameters and values outside their bounds are
-// errors that name "/effects/<id>/<parameter>". Shape parameters may be left out and take their initial
-// values.
+// errors that name "/effects/<id>/<parameter>". Absent shape parameters take their initial values.
 Result<ActiveEffect> activate(const robot::AdoptedEffect& adopted);
 
 // The inverse of activate.

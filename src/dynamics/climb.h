@@ -27,8 +27,7 @@ struct ClimbReading {
   bool bridged = true;         // the step to it is no gap (signals/gaps.h); of no account for the first
 };
 
-// The angle with the sine rise over way, both along the heading; unknown above 45 degrees, which no robot
-// drives: there the height jumped.
+// The angle with the sine rise over way, both along the heading; unknown above 45 degrees: the height jumped.
 double climb_over(double rise_m, double way_m);
 
 // The height over the way of one run, in which the robot neither turns back nor is lost sight of.

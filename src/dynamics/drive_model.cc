@@ -139,8 +139,7 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
 
     ledger[Term::copper] += resistance(s, at) * f.current_a[s] * f.current_a[s];
     ledger[Term::brush] += brush;
-    // Field energy of the winding, and the difference by unequal SI values of K_t and K_w, are stored or lost
-    // in the motor.
+    // Field energy of the winding, and the difference by unequal SI values of K_t and K_w, stay in the motor.
     ledger[Term::kinetic] += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];
     ledger[Term::friction_internal] +=
         (p.voltage_constant_v_s_rad - p.torque_constant_nm_a) * speed * f.current_a[s];

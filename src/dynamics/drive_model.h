@@ -61,8 +61,7 @@ class BasicDriveModel {
   // Armature resistance of one side, warm by its copper heat [ohm].
   S resistance(std::size_t side, const Instant& at) const;
 
-  // Battery power for the motors' electrical powers: idle and accessories, driver loss, unreturned braking
-  // power [W].
+  // Battery power for the motors' powers: idle and accessories, driver loss, unreturned braking power [W].
   S battery_power_for(const std::array<S, 2>& motor_power_w) const;
 
   // All of it, from the motion alone.

@@ -13,8 +13,7 @@ namespace joulecast::dynamics {
 
 enum class ActsOn { wheel_torque, inertia, motor, battery_side, kinematics, sensors };
 
-// One named number of an effect. The first parameter of every effect is its strength: at zero the effect is
-// absent.
+// One named number of an effect. The first one of every effect is its strength: at zero the effect is absent.
 struct EffectParameter {
   std::string_view name;
   std::string_view unit;  // "1" for a pure number

@@ -22,8 +22,7 @@ struct Instant {
   std::array<double, 2> copper_heat_w{};      // R i^2 low-passed with the thermal time constant
 };
 
-// The same motion of the body. `speed` is of the axle's middle, positive forward; `yaw_rate` positive to the
-// left.
+// The same motion of the body. `speed`: of the axle's middle, forward; `yaw_rate`: to the left.
 template <class S>
 struct Body {
   S speed_m_s = 0;
@@ -32,8 +31,7 @@ struct Body {
   S yaw_acceleration_rad_s2 = 0;
 };
 
-// v = (r1 w1 + r2 w2)/2, yaw = (r1 w1 - r2 w2)/(2l), thesis (2-4), (2-6), with each wheel's own radius and
-// slip.
+// v = (r1 w1 + r2 w2)/2, yaw = (r1 w1 - r2 w2)/(2l), thesis (2-4), (2-6), with each wheel's radius and slip.
 template <class S>
 Body<S> body_of_wheels(const Parameters<S>& p, const std::array<double, 2>& speed,
                        const std::array<double, 2>& acceleration) {

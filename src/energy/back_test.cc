@@ -117,8 +117,7 @@ std::vector<Span> blocks_of(const std::vector<Span>& bins, double block_s) {
   return blocks;
 }
 
-// One run by both models. Their blocks are drawn together, since both are compared with the same
-// measurements.
+// One run by both models. Their blocks are drawn together: both have the same measurements.
 struct Pair {
   std::vector<Span> before, after;
   bool differ = false;  // the models, on this run, by more than rounding

@@ -20,8 +20,7 @@ namespace joulecast::energy {
 
 struct MeterSettings {
   // ERKStep's local error a sample interval, as a fraction of the energy (power scale times interval) at
-  // stake in it. The power scale is the larger of the idle power and the absolute battery power at either
-  // end.
+  // stake in it. The power scale is the greatest of idle power and the absolute battery powers at both ends.
   double tolerance = 1e-4;
   double half_window_s = default_half_window_s;  // of the acceleration filter
   double gap_bridge_s = signals::usual_bound_s;  // bound of signals/gaps.h, for its callers

@@ -289,8 +289,7 @@ bool is_identified(const PowerParameters& parameters, const PowerFit& fit, Eigen
   return parameters.expected(p) > 0 && fit.deviation[p] < told_deviation;
 }
 
-// Every parameter with its value, standard error and meaning. An effect that was dropped is listed where the
-// data show that it is absent.
+// Every parameter with its value, standard error and meaning. Dropped effects only if shown to be absent.
 std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
                                                const PowerFree& free) {
   std::vector<ParameterEstimate> estimates;
@@ -313,8 +312,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
   return estimates;
 }
 
-// Parameters that these data do not identify, with the missing data, and those that no battery power
-// identifies.
+// Parameters that these data do not identify, with the missing data, and those that no data identify.
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
   std::vector<Untold> untold;
   for (Eigen::Index p = 0; p < PowerParameter::count; ++p) {
@@ -425,8 +423,7 @@ Result<Found> find(const PowerParameters& given, const PowerWindows& data, const
   return std::move(*best);
 }
 
-// Fits each half of the recordings and predicts the other; of all windows, in which wheels start and stop
-// too.
+// Fits each half of the recordings and predicts the other; of all windows, also where wheels start and stop.
 Result<MissedPower> predict_halves(const PowerParameters& parameters, const PowerWindows& data,
                                    const robot::RobotModel& robot) {
   const dynamics::DriveModel by_file = parameters.model(PowerVector::Zero());

@@ -121,8 +121,7 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
 
 PowerScale scale_of(std::span<const windows::Window> windows);
 
-// Mean reading of the battery's power meter over a window by a model [W]: begin, middle and end each with
-// their own speed.
+// Mean reading of the battery's power meter over a window by a model [W]: begin, middle and end by speed.
 double metered_power_w(const dynamics::DriveModel& model, const windows::Window& window);
 
 // Power on windows::plain_terms(), by robust regression.

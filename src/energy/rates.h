@@ -51,8 +51,7 @@ struct Coverage {
 Reading reading_of(const signals::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
                    double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w);
 
-// The reading at fraction s in [0, 1] between two. A channel that is unknown at either end is unknown in
-// between.
+// The reading at fraction s in [0, 1] between two. A channel unknown at either end is unknown in between.
 Reading between(const Reading& a, const Reading& b, double s);
 
 // All account rates at one instant. `copper_w` receives R i^2 of each motor [W].

@@ -35,8 +35,7 @@ void put_varint(Bytes& out, std::uint64_t value) {
   out.push_back(static_cast<std::byte>(value));
 }
 
-// Integers as zigzag varints of the difference of differences, both starting from 0: wrapping, so that any
-// two have a difference.
+// Integers as zigzag varints of the difference of differences, both starting from 0 and wrapping.
 void put_integers(Bytes& out, std::span<const std::int64_t> values) {
   std::uint64_t last = 0;
   std::uint64_t last_step = 0;

@@ -9,8 +9,7 @@
 #include "signals/covariates.h"
 #include "signals/sample.h"
 
-// The common format of chunks of telemetry and of covariates: little-endian numbers in one zstd frame with
-// checksum.
+// The format of chunks of telemetry and covariates: little-endian numbers in one zstd frame with checksum.
 namespace joulecast::history {
 
 using Bytes = std::vector<std::byte>;

@@ -11,8 +11,7 @@
 
 #include "history/records.h"
 
-// Everything that changes the store. A command is applied whole or not at all, and is never split over
-// transactions.
+// Everything that changes the store. A command is applied whole, in one transaction, or not at all.
 namespace joulecast::history {
 
 // Commands on a robot's telemetry carry the epoch of the robot's lease where daemons share a fleet
@@ -101,8 +100,7 @@ struct Retention {
 };
 
 // Drops raw telemetry and covariates beyond the retention, oldest first, at most `max_chunks` of it.
-// Missions, ledgers and traces stay. Outcome: the number of chunks dropped; less than max_chunks means that
-// the retention now holds.
+// Missions, ledgers and traces stay. Outcome: the number of chunks; below max_chunks the retention now holds.
 struct Prune {
   Retention retention;
   std::int64_t max_chunks = 1000;
@@ -128,8 +126,7 @@ struct InterruptDiagnoses {
   std::int64_t utime_us = 0;
 };
 
-// Supersedes the robot's open proposals of the same kind. Outcome: the proposal's id; `proposal.id` is
-// ignored.
+// Supersedes the robot's open proposals of the same kind. Outcome: its id; `proposal.id` is ignored.
 struct AddProposal {
   Proposal proposal;
   Epoch epoch = 0;
@@ -149,8 +146,7 @@ struct PruneMissions {
   std::int64_t max_missions = 0;
 };
 
-// Deletes the oldest events beyond the `keep` newest, which are at least one, at most `max_events` of them.
-// Outcome: how many.
+// Deletes the oldest events beyond the `keep` newest (at least 1), at most `max_events`. Outcome: how many.
 struct PruneEvents {
   std::int64_t keep = 0;
   std::int64_t max_events = 0;
@@ -173,16 +169,14 @@ struct KeepAnswer {
   RequestAnswer answer;
 };
 
-// Replaces the plan of its map and level; without an image deletes it. Outcome: 0. Fault::not_found if there
-// is none to delete.
+// Replaces the plan of its map and level; without an image deletes it. Outcome: 0. Fault::not_found: none.
 struct PutFloorPlan {
   FloorPlan plan;
 };
 
 // Takes a robot's model out of force. With `purge` all data of the robot except its events are deleted:
 // models, missions, recordings, training state, diagnoses, proposals. Otherwise they are kept, and open
-// missions are interrupted. Outcome: the number of missions deleted. Fault::not_found if the robot is
-// unknown.
+// missions are interrupted. Outcome: the number of missions deleted. Fault::not_found: unknown.
 struct RemoveRobot {
   std::string robot_id;
   bool purge = false;

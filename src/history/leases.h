@@ -59,8 +59,7 @@ struct LeaseOptions {
   std::chrono::milliseconds lifetime{5000};  // of a membership that is not renewed
 };
 
-// A connection to a PostgreSQL of its own, which no writer delays, made again after it was lost; used by one
-// thread.
+// A connection to a PostgreSQL of its own, which no writer delays, made again when it is lost; of one thread.
 class OwnConnection {
  protected:
   // `name` identifies it at the server; `settings` are statements for a new connection.
@@ -91,8 +90,7 @@ class Leases : OwnConnection {
   // Fault::conflict: the membership was ended, and the leases are another's.
   Result<void> renew();
   Result<ClusterState> state();
-  // Ends the membership of another node, and its connections, if it has not renewed since it was seen. False
-  // if it has.
+  // Ends another node's membership and connections if it has not renewed since it was seen. False if it has.
   Result<bool> bury(const Member& member);
   // Reports the robots from which telemetry is received, in addition to those reported before.
   Result<void> hear(const std::vector<std::string>& more, const std::vector<std::string>& no_longer);

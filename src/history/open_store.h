@@ -29,8 +29,7 @@ struct StoreOptions {
   // Of a PostgreSQL alone, as those below.
   std::chrono::milliseconds lock_wait{3000};  // for another program's hold on the store to end
   std::chrono::milliseconds query_limit{0};   // each statement of a query; 0: unlimited
-  // If set: this program's name among those that write to the store at the same time, from new_writer_name().
-  // All of them set it.
+  // If set: this program's name, by new_writer_name(), among those that write at the same time; all set it.
   std::string shared_writer = {};
   // How many commands were dropped for carrying this epoch of a robot's lease; called on apply()'s thread.
   std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped = {};

@@ -13,8 +13,7 @@
 namespace joulecast::history {
 namespace {
 
-// Statements sent before their results are read: these fit the socket's buffer, so that neither side waits
-// for the other to read.
+// Statements sent before their results are read: they fit the socket's buffer, so that neither side waits.
 constexpr int max_sent = 256;
 
 // Of the types' OIDs, which never change (pg_type.dat), those that results come in.
@@ -64,8 +63,7 @@ std::string numbered(std::string_view sql, int& parameters) {
   return text;
 }
 
-// Numbers are sent as text, which the server converts to the column's type; text and bytes are sent as they
-// are.
+// Numbers are sent as text, which the server converts to the column's type; text and bytes as they are.
 class PostgresStatement final : public Statement {
  public:
   // One that is not kept has no name at the server, which would keep it as long as the connection.
@@ -210,8 +208,7 @@ Result<void> check_postgres_url(const std::string& url) {
 }
 
 PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name) {
-  // Options of the URL come later and take precedence, except for the name. A peer that vanished is detected
-  // within half a minute.
+  // The URL's options take precedence, except for the name. A vanished peer is detected within half a minute.
   const std::array<const char*, 10> keywords = {"connect_timeout",
                                                 "target_session_attrs",
                                                 "tcp_user_timeout",

@@ -42,8 +42,7 @@ class PostgresDatabase final : public Database {
   void commit() override;
   void roll_back() override;
 
-  // The server ends every further statement after that time (0: unlimited), or after a second of waiting for
-  // a lock.
+  // The server ends every further statement after that time (0: unlimited), or after waiting 1 s for a lock.
   void limit_statements(std::chrono::milliseconds limit);
 
   pg_conn* handle() const { return handle_; }

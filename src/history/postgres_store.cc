@@ -248,8 +248,7 @@ class PostgresStore final : public SqlStore {
   // Whether no other program has written since this one did, or opened the store.
   bool is_own(const std::string& writer) const { return writer == name_ || writer == mark().writer; }
 
-  // For a shared store: takes the shared lock if the lost connection has ended and no program holds the store
-  // exclusively.
+  // Takes the shared lock if the lost connection has ended and no program holds the store exclusively.
   bool take_back(Database& database) {
     Rows others(
         database,
@@ -258,8 +257,7 @@ class PostgresStore final : public SqlStore {
     return others.next() && others.integer() == 0 && try_shared_lock(database);
   }
 
-  // Records the batch; a later connection determines the outcome of its COMMIT from it. The row is locked
-  // until the transaction ends.
+  // Records the batch, by which a later connection sees the outcome of its COMMIT. Locks the row till then.
   void mark_batch() {
     if (shared_)
       Rows(*writer_, "UPDATE cluster_writer SET batch = ?, since = now() WHERE writer = ?", batch_, name_)

@@ -121,8 +121,7 @@ struct Band {
 
 inline constexpr std::int64_t trace_bucket_us = 1'000'000;
 
-// A mission over [start, start + width): width is trace_bucket_us as stored, a multiple of it when read
-// downsampled.
+// A mission over [start, start + width): width is trace_bucket_us as stored, a multiple of it downsampled.
 struct TraceBucket {
   std::int64_t start_utime_us = 0;  // a multiple of trace_bucket_us since the epoch
   double covered_s = 0;             // time within the bucket that samples cover: the weight of its means

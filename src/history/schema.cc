@@ -17,8 +17,7 @@
 namespace joulecast::history {
 namespace {
 
-// What a schema consists of, by kind and name: of tables the columns, else the statement without blanks and
-// comments.
+// A schema's parts by kind and name: of tables the columns, else the statement without blanks and comments.
 std::map<std::string, std::string> objects_of(Database& database) {
   std::map<std::string, std::string> objects;
   Rows rows(database,
@@ -35,8 +34,7 @@ std::map<std::string, std::string> objects_of(Database& database) {
   return objects;
 }
 
-// Makes the triggers and indexes those of the schema. A change of them is the work of another program, and is
-// recorded in the audit.
+// Makes triggers and indexes those of the schema. Others are another program's; the audit records it.
 void restore_objects(Database& database, const Schema& schema) {
   std::vector<std::string> differences = schema_differences(database, schema);
   std::erase_if(differences, [](const std::string& difference) {

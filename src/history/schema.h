@@ -32,12 +32,10 @@ struct Table {
   std::vector<std::pair<std::string, std::string>> columns;  // name and SQLite's type
   std::vector<std::string> key;                              // columns of the primary key
 };
-// All of them, in an order in which no row comes before one that it refers to, but for a robot's active
-// version. Every database has them.
+// In an order in which no row comes before one that it refers to, but for a robot's active version.
 const std::vector<Table>& store_tables();
 
-// Checks that the schema's migrations begin at the older version or before. Fault::conflict if not: no
-// release wrote such a store.
+// Checks that migrations begin at the older version or before. Fault::conflict: no release wrote the store.
 Result<void> check_older(const Schema& schema, std::int64_t version);
 
 // Runs the migrations from the version to the schema's, in the caller's transaction. Fault::conflict: the
@@ -60,8 +58,7 @@ Result<void> bring_to_schema(Database& database, const Schema& schema);
 // Text of schemas/store.sql in PostgreSQL's dialect: types, collations, identities and checks.
 std::string in_postgres(std::string sql);
 
-// The schema of schemas/store.sql in PostgreSQL, with store.postgresql.sql, mission_day_sql() and
-// cluster.postgresql.sql.
+// That of schemas/store.sql with store.postgresql.sql, mission_day_sql() and cluster.postgresql.sql.
 const Schema& postgres_schema();
 
 // Brings the current schema of a PostgreSQL database (the first of its search_path) to `schema`, all in one

@@ -23,8 +23,7 @@ std::optional<std::vector<Command>> commands_of(std::span<const std::byte> bytes
 Result<void> write_spool(const std::string& path, const TakeSpool& first,
                          std::span<const Command* const> commands);
 
-// The first is the TakeSpool, with the hash of the file. Fault::corrupt for bytes that are no whole spool of
-// this program's layout.
+// The first is the TakeSpool, with the file's hash. Fault::corrupt: no whole spool of this layout.
 Result<std::vector<Command>> read_spool(const std::string& path);
 
 struct TakenSpool {

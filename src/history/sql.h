@@ -18,8 +18,7 @@
 
 // An SQL database in four types: Database, Statement, Rows (a statement being run) and Transaction. sqlite.h
 // and postgres.h implement the first two; the statements of this folder are written in the SQL that both
-// support. They throw SqlError, which never leaves this folder: the store's interface converts it to an
-// Error.
+// support. They throw SqlError, which never leaves this folder: the store's interface makes it an Error.
 namespace joulecast::history {
 
 class SqlError : public std::runtime_error {
@@ -115,8 +114,7 @@ class Database {
 };
 
 // One run of a statement: bind its parameters left to right, then step; read a row's columns left to right.
-// Resets the statement at the end of its scope. Text and blobs bound must outlive it, but for temporary
-// strings.
+// Resets the statement at the end of its scope. Bound text and blobs must outlive it, but for temporary ones.
 class Rows : boost::noncopyable {
  public:
   explicit Rows(Statement& statement) : statement_(statement) {}
@@ -185,8 +183,7 @@ std::string or_replace(std::string_view key, std::string_view columns);
 // "INSERT INTO table (columns) VALUES (?, ...)".
 std::string insert_into(std::string_view table, std::string_view columns);
 
-// "INSERT INTO table (key, columns) VALUES (?, ...)", replacing the columns of the row of the same key. All
-// comma-separated.
+// "INSERT INTO table (key, columns) VALUES (?, ...)", replacing those of the same key. Comma-separated.
 std::string insert_or_replace(std::string_view table, std::string_view key, std::string_view columns);
 
 // "?, ?, ?" for as many as the comma-separated columns.

@@ -28,8 +28,7 @@ struct DroppedCommands {
 // The commands as SQL, on the one writing connection.
 class SqlChanges {
  public:
-  // `writer`: this program's name among those that write to the store at the same time; empty: it is the only
-  // one.
+  // `writer`: this program's name among those that write at the same time; empty: it is the only one.
   SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer = {});
   ~SqlChanges();
 
@@ -45,8 +44,7 @@ class SqlChanges {
   const std::map<std::string, DroppedCommands>& dropped() const { return dropped_; }
 
  private:
-  // Rows collected from checkpoints, to be stored by one statement for each table; null: each row is stored
-  // immediately.
+  // Rows of checkpoints, to be stored by one statement for each table; null: each is stored immediately.
   struct Bulk;
   // How many samples and changes of covariates a mission has, and how many of them are in its tails.
   struct Tails {

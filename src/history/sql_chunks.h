@@ -12,8 +12,7 @@
 // Raw telemetry and covariates as SQL: two tables of one shape (schemas/store.sql). They throw SqlError.
 namespace joulecast::history::chunks {
 
-// Samples or changes of a sealed chunk: large enough to compress well, small enough to decode in a fraction
-// of a millisecond.
+// Samples or changes of a sealed chunk: enough to compress well, few enough to decode in under 1 ms.
 inline constexpr std::size_t sealed_items = 1024;
 
 // Where a mission's next samples or changes go.
@@ -21,8 +20,7 @@ struct End {
   MissionKey key = 0;
   std::int64_t next_ordinal = 0;
   std::int64_t in_tail = 0;  // of items that are not sealed
-  // Collects chunks that are not sealed, of the columns of telemetry_columns(); null: they are stored at
-  // once.
+  // Collects chunks that are not sealed, of the columns of telemetry_columns(); null: they are stored now.
   Statement* collected = nullptr;
 };
 

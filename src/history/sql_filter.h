@@ -35,8 +35,7 @@ class Where {
 
   const std::string& sql() const { return sql_; }
   void bind(Rows& rows) const;
-  // Identifies the filter in cursors. Text values are preceded by their length, so that the identity is
-  // unambiguous.
+  // Identifies the filter in cursors. Text values are preceded by their length, to be unambiguous.
   std::string identity() const;
 
  private:
@@ -53,8 +52,7 @@ class Where {
 // A place in an ordered result: two numbers with a meaning that depends on the query.
 using CursorPlace = std::array<std::int64_t, 2>;
 
-// `query` is any text that distinguishes queries; its fingerprint goes into the cursor. The result is
-// URL-safe.
+// `query` is any text that distinguishes queries; its fingerprint is in the cursor, which is URL-safe.
 std::string encode_cursor(std::string_view query, CursorPlace place);
 
 // Fault::invalid on field "cursor" for a malformed cursor or one of another query.

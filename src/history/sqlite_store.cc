@@ -93,8 +93,7 @@ void give_back(Database& database) {
   }
 }
 
-// Objects that must outlive the reading connections: the last connection closed is the one that can fold the
-// journal in.
+// Objects that must outlive the reading connections: the last one closed can fold the journal in.
 struct OpenedDatabase {
   std::vector<std::unique_ptr<FileLock>> locks;
   std::unique_ptr<Database> writer;

@@ -209,8 +209,7 @@ class Store {
   // found out when the same commands are applied again; they are then not applied twice.
   virtual bool is_in_doubt() const { return false; }
 
-  // The last batch that apply() committed, of this program or, before its first, of the one before. Any
-  // thread.
+  // The last batch that apply() committed, of this program or, before its first, the one before. Any thread.
   virtual BatchMark mark() const = 0;
 
   // How many commands apply() has dropped because their robots' leases are others'. Any thread.
@@ -257,8 +256,7 @@ class Store {
   Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const;
 
   // Changes of the covariates: at most `page.limit` (1 to max_telemetry_samples). Values that apply at the
-  // range's beginning changed before it. Empty when the retention dropped them; not_found when the mission is
-  // unknown.
+  // range's beginning changed before it. Empty when the retention dropped them; not_found: no such mission.
   Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const;
   // Passes each mission that matches to the sink, in the order of keys, outside of any lock: its sums by
   // square of `cell_m` metres (least_floor_cell_m to greatest_floor_cell_m). Reads at most about `max_points`

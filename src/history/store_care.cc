@@ -67,8 +67,7 @@ std::string common_columns(Database& database, const std::string& table) {
   return rows.next() ? rows.text() : std::string();
 }
 
-// Copies the rows of keys from..to; if they cannot be read, those of either half, down to single keys, as
-// long as rows can be expected.
+// Copies the rows of keys from..to; if they cannot be read, those of either half, down to single keys.
 void salvage_range(Database& database, const std::string& table, const std::string& columns,
                    const std::string& key, std::int64_t from, std::int64_t to, int& failures,
                    std::vector<LostKeys>& lost) {

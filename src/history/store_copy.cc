@@ -57,8 +57,7 @@ std::int64_t rows_of(Database& database, const Table& table) {
   return database.integer("SELECT count(*) FROM " + table.name);
 }
 
-// Visits the rows that the statement gives, and puts the last one's key into `last`; answers how many they
-// were.
+// Visits the rows that the statement gives, puts the last one's key into `last` and returns their number.
 template <class Visit>
 std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& last, Visit visit) {
   std::int64_t count = 0;
@@ -77,8 +76,7 @@ std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& 
   return count;
 }
 
-// Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were, 0 at the
-// end.
+// Visits the next rows by key, at most `limit`, and moves the key on; returns their number, 0 at the end.
 template <class Visit>
 std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
                   std::int64_t limit, Visit visit) {

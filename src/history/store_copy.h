@@ -9,8 +9,7 @@
 #include "base/error.h"
 #include "history/sql.h"
 
-// Whole stores, table by table: copied into another database, counted, examined. On databases of
-// open_tables().
+// Whole stores, table by table: copied into another database, counted, examined. For open_tables().
 namespace joulecast::history {
 
 inline constexpr std::size_t max_faults = 100;
@@ -31,8 +30,7 @@ struct ContentReport {
 // SqlError if the database cannot be queried.
 ContentReport check_content(Database& database);
 
-// Summary of a table. Equal rows have equal checksums in every database: FNV-1a over the values in the order
-// of the key.
+// Summary of a table. Equal rows have equal checksums in every database: FNV-1a over the values in key order.
 struct TableSummary {
   std::string table;
   std::int64_t rows = 0;

@@ -12,8 +12,7 @@ constexpr Band single(double value) {
 }
 
 // One bucket of others, or of single values, which come in order of time: the least of the least, the
-// weighted mean and the greatest; position weighted likewise; the last available charge and cumulative
-// energies.
+// weighted mean and the greatest; position weighted likewise; the last known charge and energies.
 class BucketSum {
  public:
   explicit BucketSum(std::int64_t start_utime_us) { last_.start_utime_us = start_utime_us; }
@@ -49,8 +48,7 @@ class TraceMerger {
   std::optional<BucketSum> group_;
 };
 
-// The least multiple of trace_bucket_us that covers [from, to) in at most max_points groups; from < to,
-// max_points > 0.
+// The least multiple of trace_bucket_us that covers [from, to) in at most max_points > 0 groups; from < to.
 std::int64_t merged_width_us(std::int64_t from_utime_us, std::int64_t to_utime_us, std::int64_t max_points);
 
 }  // namespace joulecast::history

@@ -241,8 +241,7 @@ void Writer::loop() {
   if (!ended_) end();
 }
 
-// Fills the batch with the next commands, or leaves it empty as a sign of life. False when stopping and all
-// is done or time is up.
+// Fills the batch, or leaves it empty as a sign of life. False when stopping and all is done or time is up.
 bool Writer::take_batch() {
   std::unique_lock lock(mutex_);
   ++status_.ticks;
@@ -341,8 +340,7 @@ bool Writer::wait_before_retry(const Error& error, std::chrono::milliseconds pau
     const auto at = Clock::now();
     if (ended_ || (stopping_ && at >= stop_deadline_)) return false;
     if (at >= until) return true;
-    // Stopping cuts the pause short to the deadline, not to nothing: a failing disk is not retried without
-    // pause.
+    // Stopping shortens the pause to the deadline: a failing disk is not retried without pause.
     const auto wake = std::min(until, at + Clock::duration(longest_sleep));
     work_.wait_until(lock, stopping_ ? std::min(wake, stop_deadline_) : wake);
   }

@@ -34,8 +34,7 @@ struct WriterOptions {
   std::chrono::milliseconds prune_interval{60'000};
   std::function<bool()> prunes;  // whether this program enforces the retention now; empty: always
   // Retention by age goes by the wall clock, so it rests for this long after a step of that clock, and never
-  // drops more than this share of the telemetry, the missions or the audit in an hour: a wrong clock must not
-  // cost the recordings.
+  // drops more than this share of the telemetry, the missions or the audit in an hour: against wrong clocks.
   std::chrono::milliseconds clock_distrust{3'600'000};
   double age_share_per_hour = 0.05;
   ClockSteps::Clock wall_clock = host_utime_us, steady_clock = host_boot_us;

@@ -30,8 +30,7 @@ constexpr std::uint64_t body_limit_bytes = 256u << 20;
 template <class T>
 using Task = asio::awaitable<T>;
 
-// One exchange. Beast has no timeouts for blocking calls, so that it is a coroutine on a loop of its own
-// under one deadline.
+// One exchange: a coroutine on a loop of its own under one deadline, as Beast's blocking calls have none.
 class Exchange {
  public:
   Exchange(const ServerAddress& server, const HttpRequest& wanted, std::chrono::milliseconds timeout)

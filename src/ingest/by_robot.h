@@ -13,8 +13,7 @@
 
 namespace joulecast::ingest {
 
-// The latest immutable value of every robot. Any thread puts and finds; the lock is held only to copy one
-// pointer, or one per robot.
+// The latest immutable value of every robot. Any thread; the lock is held only to copy pointers.
 template <class Value>
 class ByRobot {
  public:

@@ -26,8 +26,7 @@ struct ChargeView {
 // `capacity_ah` is that of the robot's battery.
 std::size_t drop_charging(double capacity_ah, std::vector<signals::Sample>& samples);
 
-// Estimates one robot's state of charge and detects its stays at chargers, within missions and outside. Its
-// memory survives restarts.
+// Estimates one robot's state of charge and detects its stays at chargers. Its memory survives restarts.
 class ChargeWatch {
  public:
   explicit ChargeWatch(const robot::RobotModel& robot);

@@ -19,8 +19,7 @@ constexpr std::uint64_t rate_samples = 20;    // ... and its rate, of 2 Hz withi
 constexpr double constant_s =
     10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
 constexpr double says_enough_s = 60;  // of motion, after which a contradiction that is gone is cleared
-// Multiple of the speed or yaw rate limit that no robot reaches by overshoot: such readings are not its
-// motion.
+// Multiple of the speed or yaw rate limit that no robot reaches by overshoot: such readings are no motion.
 constexpr double absurd_limit = 3;
 
 ContradictionKind kind_of(std::string_view id) {

@@ -16,8 +16,7 @@
 
 namespace joulecast::ingest {
 
-// Whether the battery's channels are contradicted in their state of charge; faults of single samples do not
-// count.
+// Whether the battery's channels are contradicted in their state of charge; not faults of single samples.
 bool doubts_battery(const std::vector<Contradiction>& contradictions);
 
 // Compares one robot's channels with each other and with its robot file while its missions run (gap/checks),
@@ -42,11 +41,9 @@ class ContradictionWatch {
   // The contradictions of the mission as a whole.
   std::vector<Contradiction> end_mission();
 
-  // The contradictions of the newest messages and of the mission; of the last mission until the present one
-  // is long enough.
+  // Those of the newest messages and of the mission; of the last mission until this one is long enough.
   std::vector<Contradiction> all() const;
-  // The contradictions of the last mission, also of that before a restart; they remain until another mission
-  // is long enough.
+  // The contradictions of the last mission, also of that before a restart; until another one is long enough.
   void recall(std::vector<Contradiction> of_last_mission) { keep_channels(std::move(of_last_mission)); }
   // Whether all() has changed since the last call.
   bool take_changed() { return std::exchange(changed_, false); }

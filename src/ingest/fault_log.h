@@ -9,8 +9,7 @@
 
 namespace joulecast::ingest {
 
-// Log lines of a robot's faults: the first of a kind immediately, then at most one every ten minutes with the
-// number of faults since.
+// Log lines of a robot's faults: the first of a kind, then one in ten minutes at most with the number since.
 class FaultLog {
  public:
   // The line to log, if it is time for one.

@@ -41,8 +41,7 @@ class Forecasts {
   bool siblings_pending() const { return siblings_pending_; }
   void set_siblings_pending(bool pending) { siblings_pending_ = pending; }
 
-  // Range and run time of a robot that continues its recent motion: the default answer about its autonomy.
-  // NaN while its charge is unknown.
+  // Range and run time of a robot that continues its recent motion. NaN while its charge is unknown.
   forecast::Reach reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
   forecast::Reach live_reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
 
@@ -55,8 +54,7 @@ class Forecasts {
   // Another daemon has trained on the robot's missions: the legs in the store are to be read again.
   void learnt_elsewhere(const std::string& robot_id);
 
-  // Removes the mission with this start and trains again on the rest. Empty: the mission was not used for
-  // training, or is no longer kept.
+  // Removes the mission with this start and trains again on the rest. Empty: it was not used, or is not kept.
   std::optional<history::Learned> forget(const std::shared_ptr<const ModelInForce>& model,
                                          std::int64_t start_utime_us);
 

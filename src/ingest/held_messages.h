@@ -13,8 +13,7 @@
 namespace joulecast::ingest {
 
 // The messages of robots that another daemon of the cluster keeps, since those that it has stored, for when
-// this daemon has to go on in its place. Bounded by bytes over all robots: the robot that has most loses its
-// oldest.
+// this daemon has to go on in its place. Bounded by bytes in all: the robot with most loses its oldest.
 class HeldMessages {
  public:
   // `age_us`: how long messages are kept of a robot without a lease, and before the last stored sample of one
@@ -25,8 +24,7 @@ class HeldMessages {
   std::size_t add(const InboundMessage& message);
   // The robot's, oldest first; they are no longer held.
   std::deque<InboundMessage> take(std::string_view robot_id);
-  // Drops stored messages. `now_read`: the leases were read a moment ago; otherwise messages of robots with
-  // leases are kept.
+  // Drops stored messages. `now_read`: leases were just read; else messages of robots with leases are kept.
   void forget_stored(std::int64_t host_utime_us, const Keeping::Leases& leases, bool now_read);
   std::size_t size() const { return size_; }
   std::size_t bytes() const { return bytes_; }

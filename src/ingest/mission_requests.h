@@ -28,8 +28,7 @@ std::string mission_requests_json(std::span<const MissionRequest> requests);
 Result<std::vector<MissionRequest>> stored_mission_requests(const history::Store& store,
                                                             std::string_view robot_id);
 
-// True if the store has the effect of an event: it begins or ends `newest`, the robot's newest mission, or is
-// older.
+// True if the store has the effect of an event: it begins or ends `newest`, its robot's last, or is older.
 bool has_effect(const signals::MissionEvent& event, const history::Mission& newest);
 
 }  // namespace joulecast::ingest

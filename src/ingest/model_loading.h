@@ -16,8 +16,7 @@ namespace joulecast::ingest {
 Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
                                                          const std::string& robot_id, std::int64_t version);
 
-// Puts the store's active models in force. A stored model that no longer reads is an error naming robot and
-// version.
+// Puts the store's active models in force. A model that no longer reads is an error with robot and version.
 Result<void> load_stored_models(const history::Store& store, ModelRegistry& models);
 
 // A robot file with effects of the catalogue; errors name the file.

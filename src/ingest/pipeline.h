@@ -31,8 +31,7 @@ class Pipeline {
   // From now on the store is read in a thread of its own: a robot's messages wait until its state was read.
   void start_reading() { reader_.start(); }
 
-  // Takes up robots that were read, and those that this daemon of a cluster is to keep from now on, and
-  // releases others. Call often.
+  // Takes up robots that were read or that this daemon of a cluster keeps now, releases others. Call often.
   void follow_orders();
 
   void handle(const InboundMessage& message);
@@ -60,8 +59,7 @@ class Pipeline {
   };
 
   Robot* find(const std::string& robot_id);
-  // Adds the requests of the robot to its messages, in order of time; those with an effect that its latest
-  // mission has are only noted.
+  // Adds the robot's requests to its messages, in order of time; those that its latest mission has are noted.
   static void merge(const StoredRobot& stored, Robot& robot, std::deque<InboundMessage>& messages);
   Robot& add(const StoredRobot& stored, const SessionOutputs& outputs);
   Result<StoredRobot> read(const std::string& robot_id) const;

@@ -30,8 +30,7 @@ struct RecentValue {
 // kB a robot. Any thread takes and reads.
 class RecentValues {
  public:
-  // Takes the snapshot's sample if it is a second younger than the last one taken. A step back of the robot's
-  // clock clears the values.
+  // Takes the snapshot's sample if it is a second younger than the last. A clock set back clears the values.
   void take(const RobotSnapshot& snapshot);
   // Removes robots for which `is_known(id)` is false.
   template <class Known>

@@ -59,8 +59,7 @@ struct SessionOutputs {
   FleetView& fleet;
   IngestCounters& counters;
   std::function<void(const std::string& robot_id, const std::string& text)> warn;
-  // Called for each mission that ended and may be used for training, with its legs and a function to post the
-  // results; may be empty.
+  // Called for each ended mission for training, with its legs and a function to post results; may be empty.
   using Post = std::function<void(history::Command)>;
   std::function<void(const Post& post, const std::shared_ptr<const ModelInForce>& model,
                      forecast::PastMission mission)>
@@ -69,8 +68,7 @@ struct SessionOutputs {
   std::function<std::optional<drift::Mark>(const std::string& robot_id)> last_change = {};
   // Called with a model that may be better than the one in force; may be empty.
   std::function<void(history::Proposal)> suggest = {};
-  // Reads what mission_ended needs of a robot, in the thread that reads the store, before its session begins;
-  // may be empty.
+  // Reads what mission_ended needs, in the thread that reads the store, before the session; may be empty.
   std::function<Result<void>(const std::string& robot_id)> prepare = {};
 };
 

@@ -8,8 +8,7 @@ namespace joulecast::ingest {
 namespace {
 
 constexpr std::int64_t second_us = 1'000'000;
-// A sender that has missed this number of its usual intervals is gone, unless two senders were received at
-// the same time recently.
+// A sender that has missed this number of its usual intervals is gone, unless two came at once recently.
 constexpr double missed_intervals = 50;
 constexpr std::int64_t least_patience_us = second_us / 10;
 constexpr std::int64_t contest_memory_us = 60 * second_us;

@@ -33,8 +33,7 @@ class SignatureGate {
 
   // Fault::invalid where the file holds no keys, or keys are required and there is no file.
   Result<void> read_keys();
-  // Reads a file that has changed, looking at most once a second; nothing when it has not. On an error the
-  // keys stay as they were.
+  // Reads a file that has changed, looking at most once a second. On an error the keys stay as they were.
   std::optional<Result<void>> refresh();
 
   // Why the message must not pass.

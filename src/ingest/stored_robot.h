@@ -26,8 +26,7 @@ namespace joulecast::ingest {
 inline constexpr std::string_view charge_topic = "charge";  // memory of the charge watch in the store
 
 // A tail of stored samples begins this long before the end of the open mission, for the filters of meter and
-// climb, and has at least this many samples, for the sample period (signals/gaps.h) and the samples that were
-// not settled.
+// climb, and has at least this many samples, for the sample period (signals/gaps.h) and samples not settled.
 inline constexpr std::int64_t tail_us = 5'000'000;
 inline constexpr std::size_t tail_samples = 2 * signals::steps_before;
 

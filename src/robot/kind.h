@@ -6,8 +6,7 @@
 
 namespace joulecast::robot {
 
-// Robots with the same text are of one kind: the parameters of their design, which no calibration, refinement
-// or diagnosis changes.
+// The same text for robots of one kind: the parameters of their design, which no calibration changes.
 std::string kind_of(const RobotModel& robot);
 
 }  // namespace joulecast::robot

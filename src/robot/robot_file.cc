@@ -207,8 +207,7 @@ void read(const Json& value, const std::string& pointer, const Field&, std::vect
 
 // ---- constraints between fields ----
 
-// Parallel-axis bound: the chassis's mass centre sits d ahead of the axle, the wheels at l to both sides of
-// its middle.
+// Parallel-axis bound: the chassis's mass centre is d ahead of the axle, the wheels l to both sides.
 void check_inertia(const RobotModel& model, Problems& problems) {
   if (problems.at("/kinematics") || problems.at("/mass")) return;
   const double d = model.kinematics.com_offset_m;

@@ -78,8 +78,7 @@ struct Battery {
   std::optional<double> cutoff_voltage_v;
   std::optional<double> coulombic_efficiency;  // charge returned over charge put in, (0, 1]
   std::optional<double> ageing_factor;         // present over rated capacity, (0, 1.2]
-  // Temperature: resistances and lags follow exp(activation_k (1/T - 1/298.15 K)); losses heat one lumped
-  // mass.
+  // Temperature: resistances and lags follow exp(activation_k (1/T - 1/298.15 K)); losses heat one mass.
   std::optional<double> activation_k;
   std::optional<double> thermal_resistance_k_w;  // battery to surroundings
   std::optional<double> thermal_time_constant_s;
@@ -97,8 +96,7 @@ struct Limits {
   friend bool operator==(const Limits&, const Limits&) = default;
 };
 
-// An unmodelled effect adopted from a diagnosis: its catalogue id and named parameters
-// (src/dynamics/effects).
+// An effect adopted from a diagnosis: its catalogue id and named parameters (src/dynamics/effects).
 struct AdoptedEffect {
   std::string id;
   std::vector<std::pair<std::string, double>> parameters;

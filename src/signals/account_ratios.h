@@ -7,8 +7,7 @@
 // Two figures by which missions and sums of missions are compared.
 namespace joulecast::signals {
 
-// Measured over modelled energy of the measured time; NaN without any, or where the modelled energy is not
-// positive.
+// Measured over modelled energy of the measured time; NaN without any, or where the modelled is not above 0.
 inline double energy_ratio(const Accounts& a) {
   const double modelled_j = a.measured_j - a.ledger[Term::unexplained];
   return a.measured_s > 0 && modelled_j > 0 ? a.measured_j / modelled_j

@@ -51,8 +51,7 @@ struct CovariateSeries {
   std::vector<double> value;
 };
 
-// Changes in any order as series, in the order in which the names first come; of two values of one name and
-// time the later in the list holds.
+// Changes in any order as series, as their names first come; of one name and time the last value holds.
 [[nodiscard]] std::vector<CovariateSeries> series_of(std::span<const CovariateChange> changes);
 
 // The series as changes in order of time.

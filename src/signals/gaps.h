@@ -33,8 +33,7 @@ inline constexpr double usual_bound_s = 30;
 // The longest step that is bridged in a stream of this sample period [s].
 double longest_bridged_s(double period_s, double bound_s = usual_bound_s);
 
-// A quantity that is read less often than samples come: its last reading, as long as a step of the period of
-// its readings is bridged.
+// A quantity that is read less often than samples come: its last reading, as long as its period is bridged.
 class HeldReading {
  public:
   // The value at that time, of which NaN is no reading.

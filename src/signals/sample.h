@@ -35,8 +35,7 @@ struct SampleField {
   std::string_view key;   // with its unit; both sides share it
 };
 
-// The list of a sample's numbers: visit(SampleField, number) for each, in the order of robot_telemetry_t. The
-// sample may be const.
+// visit(SampleField, number) for each number of a sample, which may be const, as in robot_telemetry_t.
 template <class S, class Visit>
 constexpr void visit_fields(S& s, Visit&& visit) {
   const auto sides = [&](std::string_view name, std::string_view key, auto& value) {

@@ -5,8 +5,7 @@
 
 namespace joulecast::statistics {
 
-// Information of whitened equations y = X b + e, e ~ N(0, 1), on their coefficients: sufficient for Gaussian
-// inference.
+// Information of whitened equations y = X b + e, e ~ N(0, 1), on their coefficients.
 struct Information {
   Eigen::MatrixXd xx;    // X'X
   Eigen::VectorXd xy;    // X'y

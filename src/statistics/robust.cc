@@ -31,8 +31,7 @@ double spread_about_zero(std::span<const double> values) {
       std::max<std::size_t>(1, static_cast<std::size_t>(0.9 * static_cast<double>(sizes.size())));
   const auto end = sizes.begin() + static_cast<std::ptrdiff_t>(kept);
   std::ranges::nth_element(sizes, end - 1);
-  // The mean of |z| below its quantile of 90 %, for a standard normal z, is 2 (phi(0) - phi(1.645))/0.9 =
-  // 0.6573.
+  // The mean of |z| below its quantile of 90 %, z standard normal, is 2 (phi(0) - phi(1.645))/0.9 = 0.6573.
   return std::accumulate(sizes.begin(), end, 0.0) / static_cast<double>(kept) / 0.6573;
 }
 

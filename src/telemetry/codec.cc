@@ -140,8 +140,7 @@ class Guard {
   std::optional<Error> error_;
 };
 
-// The content of a signed message; other bytes unchanged, also those of a damaged one, which the guard
-// refuses.
+// The content of a signed message; other bytes unchanged, also of a damaged one, which the guard refuses.
 std::span<const std::uint8_t> content_of(std::span<const std::uint8_t> bytes) {
   if (!is_signed(bytes)) return bytes;
   const auto message = decode_signed(bytes);

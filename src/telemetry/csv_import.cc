@@ -123,8 +123,7 @@ std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
 
 // Takes jumps out of positions at times in seconds.
 std::vector<double> take_jumps(std::vector<double>& position, const std::vector<double>& time_s) {
-  // A jump changes the rate twice, there and back. Turning wheels, quantised by their encoder, change it by
-  // this at most:
+  // A jump changes the rate twice, there and back. Turning wheels with encoder steps change it by at most:
   constexpr double times = 8, of_changes = 0.9;  // quantile of those that are not 0; see csv_import_test
   std::vector<std::size_t> read;
   for (std::size_t k = 0; k < position.size(); ++k)

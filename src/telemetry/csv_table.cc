@@ -19,8 +19,7 @@ tl::unexpected<Error> corrupt(std::size_t line, const std::string& what) {
   return fail(Fault::corrupt, fmt::format("line {}", line), what);
 }
 
-// The text's encoding by the zero bytes of its first characters, its byte order mark among them, or bytes
-// that UTF-8 does not have.
+// The text's encoding by zero bytes of its first characters, its byte order mark, or bytes not in UTF-8.
 std::string encoding_of(std::string_view text) {
   const auto zeros = [&](std::size_t one, std::size_t other) {
     return text.size() > 3 && text[one] == '\0' && text[other] == '\0';

@@ -15,8 +15,7 @@ constexpr std::uint32_t fragment_magic = 0x4c433033;  // "LC03"
 constexpr std::size_t short_header = 8, fragment_header = 20;
 constexpr std::size_t max_channel_length = 63;
 
-// Removes the channel's name from the front of `bytes` and returns it; empty if there is no name that LCM
-// allows.
+// Removes the channel's name from the front of `bytes` and returns it; empty if LCM allows no such name.
 std::string_view take_channel(std::span<const std::uint8_t>& bytes) noexcept {
   const auto window = bytes.first(std::min(bytes.size(), max_channel_length + 1));
   const auto end = std::ranges::find(window, std::uint8_t{0});

@@ -60,8 +60,7 @@ class EventLogReader {
   static Result<EventLogReader> open(const std::string& path, LogLimits limits = {});
   explicit EventLogReader(Source source, LogLimits limits = {});
 
-  // The next event, or the reason why no event follows. A truncated or corrupt place is reported again until
-  // resync().
+  // The next event, or the reason why no event follows. A damaged place is reported again until resync().
   LogRead next();
 
   // Move to the next sync word after the present place that begins a whole, plausible event which another
@@ -99,8 +98,7 @@ struct LogTally {
 };
 
 // Passes every event of a log to `take` until it returns false; reports damaged places to `damaged` and skips
-// them. Adds to `tally`. Returns whether the log was read to its end; errors are those of `take`, of opening
-// and of reading.
+// them. Adds to `tally`. Returns whether the log was read to its end; errors: of `take`, opening and reading.
 Result<bool> read_events(const std::string& path, const std::function<Result<bool>(const LogEvent&)>& take,
                          LogTally& tally, const std::function<void(const LogRead&)>& damaged = {});
 
@@ -110,8 +108,7 @@ class EventLogWriter {
   static Result<EventLogWriter> create(const std::string& path);
 
   Result<void> write(std::int64_t timestamp_us, std::string_view channel, std::span<const std::uint8_t> data);
-  // Flush and close, and return whether every byte reached the system. The destructor closes without a
-  // report.
+  // Flushes, closes, and returns whether every byte reached the system. The destructor only closes.
   Result<void> close();
 
   [[nodiscard]] std::int64_t count() const noexcept { return count_; }

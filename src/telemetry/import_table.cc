@@ -126,8 +126,7 @@ Result<ImportTable> ImportTable::open(std::string_view text, const TableLayout& 
   return opened;
 }
 
-// A sign is between groups if no number has it as a decimal sign, and a column with it has integers below
-// 1000.
+// A sign is between groups if it is no number's decimal sign, and a column with it has integers below 1000.
 void ImportTable::detect_decimal() {
   constexpr int probed = 200;                      // rows
   std::map<char, std::size_t> numbers, fractions;  // by sign

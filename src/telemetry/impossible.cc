@@ -17,8 +17,7 @@ constexpr std::int64_t least_frozen_us = 1'000'000;
 constexpr double least_varied = 0.25;
 
 // The stream is frozen if every reading repeats for as long while the robot moves. Motion explains that in
-// simulations without noise: a reading has to turn back in this share of the rows, as noise does in two of
-// three.
+// simulations without noise: a reading has to turn back in this share of rows, as noise does in 2/3.
 constexpr double noisy_share = 0.5;
 
 // A reading beyond the robot file and more than this many times all before is none, however often it

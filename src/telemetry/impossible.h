@@ -19,15 +19,13 @@ namespace joulecast::telemetry {
 // half, double or single cell.
 inline constexpr double least_voltage_share = 0.6, greatest_voltage_share = 1.5;
 
-// Share of faulty messages or impossible readings that indicates a mistake. Reboots, losses and late packets
-// stay far below.
+// Share of faulty messages or impossible readings that indicates a mistake. Reboots and losses are far below.
 inline constexpr double mistaken_share = 0.2;
 
 // A sentence on telemetry at a rate that is too low for accounts of currents; empty at others.
 [[nodiscard]] std::string slow_stream(double rate_hz);
 
-// Readings that one robot cannot have, found sample by sample in the order of time from the past samples
-// alone, with constant memory.
+// Readings that one robot cannot have, found from past samples in order of time, with constant memory.
 class ImpossibleReadings {
  public:
   explicit ImpossibleReadings(const robot::RobotModel& robot);

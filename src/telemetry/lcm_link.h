@@ -54,8 +54,7 @@ class LcmLink {
   ~LcmLink();
 
   // Receives the messages of the channels that robots publish on, until the link goes; once a link.
-  // `counters` of the datagrams that came by UDP, and must outlive the link. Errors name the setting that is
-  // at fault.
+  // `counters` of the datagrams that came by UDP, and must outlive the link. Errors name the setting.
   Result<void> listen(Handler handler, DatagramCounters& counters, const ListenOptions& options = {});
 
   Result<void> publish(const std::string& channel, std::span<const std::uint8_t> data);

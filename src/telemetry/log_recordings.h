@@ -26,8 +26,7 @@ struct LogRecordings {
   std::vector<Recording> recordings;          // their samples in order of time; a mission may hold none
   std::set<std::string, std::less<>> robots;  // all that occur, requested or not
   std::size_t samples_outside = 0;            // of no mission: before its start, or just after an end
-  // Messages and covariates that decode to nothing, break a limit or come late, samples of one time, and
-  // damaged places of the files.
+  // Undecodable, late and limit-breaking messages and covariates, samples of one time, and damaged places.
   std::size_t unreadable = 0;
   // Of these, by field.
   std::map<std::string, BeyondRange> beyond_range{};

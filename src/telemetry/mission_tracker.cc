@@ -143,8 +143,7 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
   if (current_ && current_->implicit && event.utime_us >= begin_us_) {
     close(actions, event.utime_us, end, "reported by the robot as " + event.mission_id);
   } else if (current_ && event.utime_us > begin_us_ + limits_.reorder_us) {
-    // A robot does one mission at a time: the mission that ends now began after the open one, and its start
-    // was lost.
+    // A robot does one mission at a time: the one that ends now began after the open one; its start was lost.
     close(actions, event.utime_us, MissionEnd::superseded,
           "holds mission " + event.mission_id + " too; its start was not received");
     explicit_end_us_ = event.utime_us;

@@ -18,8 +18,7 @@ struct MissionLimits {
   std::int64_t implicit_max_us = 3'600'000'000;  // an implicit mission is cut into pieces no longer than this
   std::int64_t explicit_silence_us = 600'000'000;  // silence after which a mission counts as never finished
   std::int64_t explicit_max_us = 24 * 3'600'000'000LL;  // a mission longer than this counts as never finished
-  // Events older by more than this show a clock set back; starts of one name nearer than this are one
-  // start.
+  // Events older by more than this show a clock set back; nearer starts of one name are one.
   std::int64_t reorder_us = 5'000'000;
   std::int64_t after_end_us = 500'000;  // samples this soon after a mission's end start no other
 };

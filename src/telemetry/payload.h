@@ -13,8 +13,7 @@ namespace joulecast::telemetry {
 class MissionPayload {
  public:
   MissionPayload() = default;
-  // `declared_kg` at the mission's start, NaN: none. `told`: earlier samples had a load, or a 0 that was
-  // valid.
+  // `declared_kg` at the mission's start, NaN: none. `told`: earlier samples had a load or a valid 0.
   explicit MissionPayload(double declared_kg, bool told = false) : kg_(declared_kg), told_(told) {}
 
   // Whether the sample's 0 contradicts the mission's start.

@@ -20,8 +20,7 @@ class ClimbReader {
   signals::HeldReading pitch_;
 };
 
-// The climb at each sample of a recording (dynamics::climb_along): from its pitch, else from its covariate
-// height_m.
+// The climb at each sample of a recording (dynamics::climb_along): from its pitch, else covariate height_m.
 [[nodiscard]] std::vector<double> climb_of(const Recording& recording,
                                            const dynamics::Parameters<double>& parameters);
 

@@ -35,8 +35,7 @@ bool same(double a, double b) {
   return a == b || (std::isnan(a) && std::isnan(b));
 }
 
-// Short missions in a row with one payload become one recording. A pause between them is a gap in its
-// samples.
+// Short missions in a row with one payload become one recording. A pause between them is a gap.
 std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::string>& notes) {
   std::vector<Recording> result;
   std::vector<std::string> names;  // joined into the last of the result

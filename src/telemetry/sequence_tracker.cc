@@ -65,8 +65,7 @@ Placement SequenceTracker::place(std::int64_t sequence, std::int64_t utime_us) n
       return placement;
     case Arrival::late:
       ++counters_.late;
-      // A number so old that a newer one holds its slot is not remembered: its repetition will count as late
-      // again.
+      // A number so old that a newer one holds its slot is not remembered: repeated it counts as late.
       if (slot(sequence).sequence < sequence) slot(sequence) = {sequence, utime_us};
       return placement;
   }

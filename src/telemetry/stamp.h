@@ -22,8 +22,7 @@ class StampReader {
   static Result<StampReader> create(const std::string& zone, const std::string& format = {});
 
   // In an hour that a zone's clock repeats, the time nearest to the stamp read before; without one, the
-  // first. Digits behind microseconds are cut off. Errors have no field; the message starts with "is no
-  // time".
+  // first. Digits behind microseconds are cut off. Errors have no field and begin with "is no time".
   Result<std::int64_t> read(std::string_view text);
 
  private:

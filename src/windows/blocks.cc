@@ -15,8 +15,7 @@ std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mis
   double total_s = 0;
   for (const double length : mission_length_s) total_s += length;
   const double block_s = std::max(shortest_block_s, total_s / static_cast<double>(most_blocks));
-  // Each mission is divided into equal segments; missions shorter than a block are joined with the ones after
-  // them.
+  // Each mission is divided into equal segments; missions shorter than a block are joined with the next.
   std::vector<std::size_t> parts(mission_length_s.size(), 1), first(mission_length_s.size(), 0);
   std::size_t blocks = 0;
   double open_s = 0;  // of the block that short missions share

@@ -11,8 +11,7 @@
 
 namespace joulecast::windows {
 
-// One mission's channels as columns, with the quantities that are computed from every sample. Private to this
-// folder.
+// One mission's channels as columns, with quantities computed from every sample. Private to this folder.
 struct Track {
   std::vector<double> time_s;  // since the first sample
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,

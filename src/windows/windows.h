@@ -98,15 +98,13 @@ struct Readings {
 // How these recordings were read; a repetition that a window averages out is none.
 Readings find_readings(std::span<const telemetry::Recording> missions);
 
-// Names of all covariates of these missions that differ anywhere, in order; height, from which the climb
-// follows, is not among them.
+// Names of the covariates of these missions that differ anywhere, in order, without the climb's height.
 std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
 
 // Windows of all missions, half overlapping. Channels with held readings have windows of their own, one per
 // reading, after the others of their mission. Where battery power is compared with the motion alone, its
 // windows are rows of new readings that do not overlap, each of half a second or two readings. The motion at
-// a reading is a straight line through the wheel speeds about it, and the parts of a row are means over its
-// readings.
+// a reading is a straight line through the wheel speeds about it, a row's parts are means over its readings.
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings = {});

@@ -59,12 +59,7 @@ export async function getText(path, type, signal) {
 }
 
 const send = (method) => (path, body, signal) =>
-  call(path, {
-    method,
-    body: JSON.stringify(body),
-    headers: { 'content-type': 'application/json' },
-    signal,
-  });
+  call(path, { method, body: JSON.stringify(body), headers: { 'content-type': 'application/json' }, signal });
 export const post = send('POST');
 export const put = send('PUT');
 

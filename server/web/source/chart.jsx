@@ -104,8 +104,7 @@ export const timesWith = (more) => ({
   },
 });
 
-// Sorted times with another one in every gap that is longer than `longest`. Columns that have nothing there
-// draw no line over it.
+// Sorted times with another one in every gap longer than `longest`, over which no line is drawn.
 export const withGaps = (times, longest) =>
   times.flatMap((t, k) => (k > 0 && t - times[k - 1] > longest ? [(t + times[k - 1]) / 2, t] : [t]));
 

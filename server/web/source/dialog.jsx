@@ -56,8 +56,7 @@ export function ConfirmButton({ label, title, action = label, onConfirm, childre
   );
 }
 
-// The dialog for a token, opened when the service rejects a request without one; once it is closed, only by
-// the user.
+// The dialog for a token, opened when a request without one is rejected; once closed, only by the user.
 export function SignIn() {
   const closed = useRef(false);
   const [open, setOpen] = useState(false);

@@ -48,7 +48,6 @@ export function energy(value, significant = 3) {
   };
 }
 
-// Consumption from joules a metre.
 export function consumption(joulePerMetre) {
   if (!known(joulePerMetre)) return none;
   return choice.get() === 'Wh'

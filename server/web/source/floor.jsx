@@ -246,8 +246,7 @@ export const powerAt = ({ measured_power_w: measured, modelled_power_w: modelled
 // Rows [x m, y m, value(k)] of a trace.
 export const rowsOf = ({ x_m: x, y_m: y }, value) => x.map((m, k) => [m ?? NaN, y[k] ?? NaN, value?.(k)]);
 
-// `points`: rows [x m, y m, value]. `cursor`: index of the row to mark, or null. `under`: a path drawn dashed
-// below it.
+// `points`: rows [x m, y m, value]. `cursor`: the marked row, or null. `under`: a path drawn dashed below it.
 export function FloorPath({
   points,
   kind = 'power',

@@ -101,7 +101,6 @@ export function text(quantity) {
   return quantity.u === '' ? quantity.n : `${quantity.n}\u00a0${quantity.u}`;
 }
 
-// A share in percent, as text.
 export const share = (value, places = 0) => text(percent(value, places));
 
 // A duration: 8.4 s, 3 min 20 s, 5 h 07 min, 12 d.

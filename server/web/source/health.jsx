@@ -117,8 +117,7 @@ export function Health({ state, reasons = [] }) {
   );
 }
 
-// All reasons for attention with the required actions; `of` is an entry of useAttention(), `more(reason)` is
-// placed after a reason.
+// Reasons for attention with their actions; `of`: an entry of useAttention(), `more(reason)`: after each.
 export function Reasons({ of, more }) {
   if (!of) return null;
   return (

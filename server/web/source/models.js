@@ -1,5 +1,4 @@
-// Robots' models in force, each requested once, for the battery's capacity, which the live state does not
-// contain.
+// Robots' models in force, each requested once, for the battery's capacity, which live states lack.
 import { forget, get, getOnce, idPath, useRead, useRenewed } from './api.js';
 import { useLive } from './live.js';
 

@@ -20,8 +20,7 @@ export function keepInAddress(values) {
   history.replaceState(null, '', `${path || '#/fleet'}${query(values)}`);
 }
 
-// The parameters of a view in its address, and a function that changes some of them; an empty value removes a
-// parameter.
+// A view's parameters in its address, and a function that changes some; an empty value removes one.
 export function useChoices(asked) {
   const [given, setGiven] = useState(asked);
   const latest = useRef(given); // charts keep the function that they were made with

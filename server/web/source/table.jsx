@@ -120,7 +120,6 @@ export function Table({ columns, rows, keyOf, sort, onSort, class: name = '' }) 
   );
 }
 
-// A panel that is a table, with a note below it.
 export const TablePanel = ({ title, aside, note, ...table }) => (
   <Panel title={title} aside={aside}>
     <Table {...table} />

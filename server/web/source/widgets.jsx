@@ -56,8 +56,7 @@ export const Texts = ({ of }) =>
     </ul>
   );
 
-// Measured over modelled energy; marked where the model is off by more than a tenth, more than missions
-// usually scatter.
+// Measured over modelled energy; marked beyond a tenth, more than missions usually scatter.
 export function Ratio({ value }) {
   const off = format.known(value) && Math.abs(value - 1) > 0.1;
   return <span class={off ? 'ratio off' : 'ratio'}>{format.fixed(value, 3)}</span>;
@@ -141,8 +140,7 @@ export const Key = ({ of }) =>
     .filter(([, name]) => name)
     .map(([kind, name]) => [<span class={`swatch ${kind}`} />, ` ${name} `]);
 
-// A button, or with `href` a link like one. Without the role `needs` it is disabled with the reason, as with
-// another `refusal`.
+// A button, or with `href` a link like one. Disabled without the role `needs`, or with a `refusal`.
 export function Button({ needs, refusal = needs && refusalFor(needs), disabled, href, ...more }) {
   if (href) return <a class="button" href={href} {...more} />;
   return <button type="button" disabled={disabled || refusal !== undefined} title={refusal} {...more} />;
@@ -167,8 +165,7 @@ export function Guard({ children }) {
   return error ? <Failure error={error} retry={reset} /> : children;
 }
 
-// Ids, or [id, name], as options of a choice; drawn again only when they change, since live values come many
-// times a second.
+// Ids, or [id, name], as options of a choice; drawn again only when they change, not with every live value.
 export function useOptions(ids) {
   return useMemo(
     () =>

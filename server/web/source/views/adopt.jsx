@@ -1,5 +1,4 @@
-// Adoption of the effects found by a diagnosis: a choice among confounded effects, a back-test and a
-// confirmation.
+// Adoption of a diagnosis's effects: a choice among confounded ones, a back-test and a confirmation.
 import { useState } from 'preact/hooks';
 import { idPath, post, useGet } from '../api.js';
 import { Strips } from '../bars.jsx';

@@ -50,8 +50,7 @@ export const TextField = ({ label, value, onChange, ...more }) => (
   </Field>
 );
 
-// An input that gives its value when it is complete (onChange): until then typed text stays, also when
-// the view is drawn again.
+// An input that gives its value when complete (onChange); until then typed text survives drawing the view.
 export function TypedInput({ value = '', ...more }) {
   const [text, setText] = useState(value);
   useEffect(() => setText(value), [value]);
@@ -70,8 +69,7 @@ export function NumberInput({ value, onChange, ...more }) {
   return <input type="number" step="any" {...more} value={text} onInput={take} />;
 }
 
-// A day, or with `minutes` a time, in the page's order of year, month and day; the browser's own field has
-// the order of its language.
+// A day, or with `minutes` a time, as year, month and day; the browser's own field has its language's order.
 export function DayField({ label, value = '', onChange, minutes }) {
   const picker = useRef(null);
   const pattern = minutes ? '\\d{4}-\\d\\d-\\d\\d \\d\\d:\\d\\d' : '\\d{4}-\\d\\d-\\d\\d';
@@ -108,8 +106,7 @@ export function DayField({ label, value = '', onChange, minutes }) {
   );
 }
 
-// Fields of the parameters `given`, which they change by `change({key: value})`. `of(key, now)`: the props of
-// any field; the others draw one.
+// Fields that change the parameters `given` by `change({key: value})`. `of(key, now)`: the props of one.
 export function fieldsOf(given, change) {
   const of = (key, value = given[key]) => ({ value, onChange: (next) => change({ [key]: next }) });
   return {
@@ -137,8 +134,7 @@ export function Filters({ label, children }) {
   );
 }
 
-// A choice of some of `options` [id, name], as ids between commas; each chosen one is a button that leaves it
-// out again.
+// A choice of some of `options` [id, name], as ids between commas; each chosen one is a button that drops it.
 export function Several({ label, one, value, onChange, options, none }) {
   const chosen = value ? value.split(',') : [];
   const names = new Map(options);
@@ -171,7 +167,6 @@ export function Several({ label, one, value, onChange, options, none }) {
   );
 }
 
-// Some of the robots `ids`.
 export const SomeRobots = ({ ids, ...more }) => (
   <Several label="Robots" one="Robot" options={ids.map((id) => [id, id])} {...more} />
 );

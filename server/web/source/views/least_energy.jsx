@@ -71,8 +71,7 @@ function drivenRuns(mission, trace, idlePowerW) {
     : found;
 }
 
-// The payload of each run as reported by the robot and used in the accounts; null if it is not stored or was
-// never reported.
+// The payload of each run as reported by the robot and used in the accounts; null if not stored or reported.
 async function payloadsOf(mission, runs, signal) {
   if (runs.length > mostAsked) return null;
   const samples = await Promise.all(

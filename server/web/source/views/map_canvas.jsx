@@ -7,8 +7,7 @@ import { useNarrow } from '../widgets.jsx';
 
 export const planPath = ({ map, level }) => `/v1/maps/${idPath(map)}/levels/${idPath(level)}`;
 
-// The decoded image of the level; null until it is loaded, and without a plan. An SVG is an image here, too:
-// its scripts do not run.
+// The decoded image of the level; null until loaded, and without a plan. As an image, an SVG runs no scripts.
 export function useImage(level) {
   const [image, setImage] = useState(null);
   const path = level && planPath(level);

@@ -60,22 +60,16 @@ function missionColumns(missions, models, withRobot) {
   const columns = [
     column('start', 'Started', (m) => format.time(m.start_utime_us), { class: 'when' }),
     column('robot', 'Robot', (m) => <a href={robotLink(m.robot_id)}>{m.robot_id}</a>),
-    column('mission', 'Mission', (m) => <a href={missionLink(m.id)}>{m.mission_id}</a>, {
-      head: true,
-    }),
+    column('mission', 'Mission', (m) => <a href={missionLink(m.id)}>{m.mission_id}</a>, { head: true }),
     column('state', 'State', (m) => <StateCell mission={m} />, { class: 'states' }),
     figure('duration', 'Duration', (m) => format.span(m.energy.duration_s)),
     figure('distance', 'Distance', (m) => format.length(m.energy.distance_m)),
-    figure('payload', 'Payload', (m) => format.unit(m.payload_kg, 'kg'), {
-      class: 'figure wide',
-    }),
+    figure('payload', 'Payload', (m) => format.unit(m.payload_kg, 'kg'), { class: 'figure wide' }),
     figure('energy', 'Energy', (m) => energyIn(scale, m.energy.battery_j)),
     figure('charge', 'Charge used', (m) => format.percent(share(m), 2), {
       hint: 'share of a full battery, if the robot file states its capacity',
     }),
-    figure('modelled', 'Modelled', (m) => energyIn(scale, m.energy.modelled_j), {
-      class: 'figure wide',
-    }),
+    figure('modelled', 'Modelled', (m) => energyIn(scale, m.energy.modelled_j), { class: 'figure wide' }),
     figure('ratio', 'Ratio', (m) => <Ratio value={m.ratio} />, {
       hint: 'measured energy over modelled energy',
     }),

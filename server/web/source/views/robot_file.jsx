@@ -19,8 +19,7 @@ function named(key) {
   return { label: name[0].toUpperCase() + name.slice(1), unit };
 }
 
-// The groups of the form: fields that are a number, a pair of numbers or a text. Others are kept as the file
-// has them.
+// The groups of the form: fields that are a number, a pair of numbers or a text. Others are kept as they are.
 function groupsOf(document) {
   const resolved = (schema) =>
     schema.$ref ? { ...document.components.schemas[schema.$ref.split('/').at(-1)], ...schema } : schema;

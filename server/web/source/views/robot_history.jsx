@@ -259,8 +259,7 @@ function RatioChart({ history }) {
   );
 }
 
-// Of the ratios of robots of one kind: this robot, the outlying robots and those with the largest departures,
-// in the order of the service.
+// Of the ratios of one kind, in order: this robot, the outlying ones and those with the largest departures.
 const mostSiblings = 12;
 function chosenOf(siblings, id) {
   const off = (s) =>

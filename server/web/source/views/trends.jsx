@@ -25,8 +25,7 @@ const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
 
 const totalsPath = (filter) => `/v1/mission-totals${query(filter)}`;
 
-// The period of the choices and the one that it is compared with, by default the same length before it, as
-// parameters of the service.
+// The chosen period and the one compared with it, by default as long before it, as the service's parameters.
 function periodsOf(given, kind) {
   const { to_utime_us: to = Date.now() * 1000, from_utime_us: start } = timesOf(given.from, given.to);
   const from = start ?? to - (Number(given.last) || defaultDays[kind]) * dayMs * 1000;
