@@ -145,8 +145,7 @@ Result<const Setting*> setting_of_flag(const std::string& name) {
 Result<void> read_flags(const std::vector<std::string>& arguments, Given& given) {
   for (std::size_t i = 0; i < arguments.size(); ++i) {
     const std::string& argument = arguments[i];
-    const auto action = std::find_if(actions.begin(), actions.end(),
-                                     [&](const auto& each) { return each.first == argument; });
+    const auto action = std::ranges::find(actions, argument, &std::pair<std::string_view, Action>::first);
     if (action != actions.end()) {
       if (given.action.value_or(action->second) != action->second)
         return invalid(argument, "only one such command can be given");
@@ -250,8 +249,8 @@ Target limit(std::optional<std::int64_t>& member, double unit) {
 
 std::string Setting::flag() const {
   std::string name = "--" + std::string(key);
-  std::replace_if(
-      name.begin(), name.end(), [](char c) { return c == '.' || c == '_'; }, '-');
+  std::ranges::replace_if(
+      name, [](char c) { return c == '.' || c == '_'; }, '-');
   return name;
 }
 

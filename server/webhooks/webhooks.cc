@@ -64,7 +64,7 @@ Result<std::vector<Webhook>> parse(std::string_view text, const std::filesystem:
   TRY_ASSIGN(const auto list, read_list(text, "webhooks"));
   std::vector<Webhook> webhooks;
   for (std::size_t k = 0; k < list.size(); ++k) {
-    TRY_ASSIGN(auto webhook, read_webhook((list)[k], "/webhooks/" + std::to_string(k), folder));
+    TRY_ASSIGN(auto webhook, read_webhook(list[k], "/webhooks/" + std::to_string(k), folder));
     webhooks.push_back(std::move(webhook));
   }
   return webhooks;

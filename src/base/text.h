@@ -60,7 +60,7 @@ inline std::string percent_encoded(std::string_view text) {
   return encoded;
 }
 
-// FNV-1a, 64 bits, continued from `hash`. It detects mistakes and tells versions apart, not adversaries.
+// FNV-1a, 64 bits, continued from `hash`. It detects mistakes and distinguishes versions, not adversaries.
 constexpr std::uint64_t fnv1a(std::string_view bytes, std::uint64_t hash = 0xcbf29ce484222325) {
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
   return hash;

@@ -2,6 +2,7 @@
 
 #include <zstd.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cassert>
@@ -35,7 +36,6 @@ void put_varint(Bytes& out, std::uint64_t value) {
   out.push_back(static_cast<std::byte>(value));
 }
 
-// Integers as zigzag varints of the difference of differences, both starting from 0 and wrapping.
 void put_integers(Bytes& out, std::span<const std::int64_t> values) {
   std::uint64_t last = 0;
   std::uint64_t last_step = 0;
@@ -48,12 +48,8 @@ void put_integers(Bytes& out, std::span<const std::int64_t> values) {
   }
 }
 
-// Doubles' bits: a byte 0 and 8 bytes when all are the same, else a byte 1 and eight planes of as many bytes,
-// least significant first, of every value's bits XORed with those of the value before it.
 void put_doubles(Bytes& out, std::span<const std::uint64_t> bits) {
-  bool constant = true;
-  for (const std::uint64_t value : bits) constant = constant && value == bits.front();
-  if (constant) {
+  if (std::ranges::count(bits, bits.front()) == std::ssize(bits)) {
     out.push_back(std::byte{0});
     for (int k = 0; k < 8; ++k) out.push_back(static_cast<std::byte>(bits.front() >> (8 * k)));
     return;
