@@ -24,15 +24,15 @@ Siblings pool(Subject subject, std::span<const OwnFinding* const> others) {
   std::vector<const Habit*> habits;
   for (const OwnFinding* finding : known) habits.push_back(&finding->habit);
   siblings.habit = habit_of_kind(habits);
-  const auto root_mean_square = [&](const auto& deviation) {
-    double squares = 0;
-    for (const OwnFinding* finding : known) squares += std::pow(deviation(finding->scatter), 2);
-    return std::sqrt(squares / static_cast<double>(known.size()));
+  const auto scale = [&](const auto& deviation) {
+    double precision = 0;
+    for (const OwnFinding* finding : known) precision += std::pow(deviation(finding->scatter), -2);
+    return std::sqrt(static_cast<double>(known.size()) / precision);
   };
   Scatter& scatter = siblings.scatter.emplace();
   for (std::size_t k = 0; k < motion_count; ++k)
-    scatter.legs[k] = root_mean_square([k](const Scatter& s) { return s.legs[k]; });
-  scatter.common = root_mean_square([](const Scatter& s) { return s.common; });
+    scatter.legs[k] = scale([k](const Scatter& s) { return s.legs[k]; });
+  scatter.common = scale([](const Scatter& s) { return s.common; });
   for (std::size_t k = 0; k < feature_count; ++k) {
     const double assumed = between * between * start.covariance[k][k];
     double spread = assumed, mean = start.mean[k], variance = start.covariance[k][k];

@@ -90,13 +90,15 @@ void recorded_worlds() {
 
 void foreign_rows(std::uint64_t seed, std::size_t kinds) {
   const ForeignCoverage coverage = foreign_coverage(seed, kinds);
-  std::printf("%-32s %5s %9s %8s %10s %8s\n", "stated", "n", "energy", "in 90 %", "duration", "in 90 %");
+  std::printf("%-32s %5s %9s %8s %8s %10s %8s\n", "stated", "n", "energy", "in 90 %", "width", "duration",
+              "in 90 %");
   for (const auto& [name, row] : coverage.rows) {
     const auto percent = [&, n = static_cast<double>(row.count())](std::size_t part) {
       return 100 * static_cast<double>(part) / n;
     };
-    std::printf("%-32s %5zu %+8.1f%% %7.1f%% %+9.1f%% %7.1f%%\n", name.c_str(), row.count(),
+    std::printf("%-32s %5zu %+8.1f%% %7.1f%% %7.2f%% %+9.1f%% %7.1f%%\n", name.c_str(), row.count(),
                 100 * upper_median(row.energy_error), percent(row.energy_inside),
+                100 * row.energy_width / static_cast<double>(row.count()),
                 100 * upper_median(row.duration_error), percent(row.duration_inside));
   }
   for (const auto& [title, all] : {std::pair("from five missions on", coverage.known),

@@ -46,6 +46,7 @@ class Counting {
     RowCoverage& counted = coverage.rows[row];
     counted.energy_error.push_back(mission.true_j / energy.quantile(0.5) - 1);
     counted.duration_error.push_back(mission.duration_s / duration.quantile(0.5) - 1);
+    counted.energy_width += (energy.quantile(0.95) - energy.quantile(0.05)) / energy.quantile(0.5);
     counted.energy_inside += inside(energy, mission.true_j);
     counted.duration_inside += inside(duration, mission.duration_s);
     for (const double share : {0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2}) {

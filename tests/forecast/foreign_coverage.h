@@ -12,6 +12,7 @@ namespace joulecast::forecast {
 // Forecasts of one kind of request after as many missions, counted against the missions' costs.
 struct RowCoverage {
   std::vector<double> energy_error, duration_error;    // measured over the median, less 1
+  double energy_width = 0;                             // sum of the interval's width over the median
   std::size_t energy_inside = 0, duration_inside = 0;  // the 90 % interval
   std::size_t count() const { return energy_error.size(); }
 };

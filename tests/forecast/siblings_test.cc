@@ -57,8 +57,8 @@ TEST(Siblings, ScatterIsTheKinds) {
   const OwnFinding* const others[] = {&found[0], &found[1]};
   const Scatter kind = pool(Subject::stated_energy, others).scatter.value();
   EXPECT_NEAR(kind.legs[0], 0.01, 1e-12);
-  EXPECT_NEAR(kind.legs[1], std::sqrt(0.5 * (0.02 * 0.02 + 0.04 * 0.04)), 1e-12);
-  EXPECT_NEAR(kind.common, std::sqrt(0.5 * (0.006 * 0.006 + 0.008 * 0.008)), 1e-12);
+  EXPECT_NEAR(kind.legs[1], std::sqrt(2 / (std::pow(0.02, -2) + std::pow(0.04, -2))), 1e-12);
+  EXPECT_NEAR(kind.common, std::sqrt(2 / (std::pow(0.006, -2) + std::pow(0.008, -2))), 1e-12);
   EXPECT_FALSE(pool(Subject::stated_energy, {}).scatter);
 }
 
