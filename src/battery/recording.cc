@@ -1,6 +1,7 @@
 #include "battery/recording.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +13,7 @@
 #include "base/text.h"
 #include "base/text_file.h"
 #include "base/try.h"
+#include "telemetry/csv_table.h"
 
 namespace joulecast::battery {
 namespace {
@@ -27,40 +29,21 @@ constexpr std::array<std::string_view, 5> column_names[] = {
 enum : std::size_t { time_column, current_column, voltage_column, temperature_column, cycle_column, columns };
 constexpr std::size_t required_columns = 3;
 
-std::string_view next_line(std::string_view& text) {
-  std::string_view line = take_item(text, '\n');
-  if (line.ends_with('\r')) line.remove_suffix(1);
-  return line;
-}
-
-std::vector<std::string_view> cells_of(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (;;) {
-    const std::size_t comma = line.find(',');
-    cells.push_back(trimmed(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return cells;
-    line.remove_prefix(comma + 1);
-  }
-}
-
 // The position of each of our columns in the header.
-Result<std::vector<std::optional<std::size_t>>> positions(std::string_view header) {
-  if (header.starts_with("\xef\xbb\xbf")) header.remove_prefix(3);
-  const auto cells = cells_of(header);
+Result<std::vector<std::optional<std::size_t>>> positions(const std::vector<std::string>& header) {
   std::vector<std::optional<std::size_t>> found(columns);
   for (std::size_t c = 0; c < columns; ++c) {
     for (const std::string_view name : column_names[c]) {
-      const auto at = std::ranges::find_if(cells, [&](std::string_view cell) {
-        return !cell.empty() && boost::algorithm::iequals(cell, name);
-      });
-      if (at == cells.end()) continue;
-      found[c] = static_cast<std::size_t>(at - cells.begin());
+      const auto at = std::ranges::find_if(
+          header, [&](std::string_view cell) { return boost::algorithm::iequals(trimmed(cell), name); });
+      if (at == header.end()) continue;
+      found[c] = static_cast<std::size_t>(at - header.begin());
       break;
     }
     if (!found[c] && c < required_columns)
       return invalid(std::string(column_names[c][0]),
-                     "is not among the columns that the first line names: \"" +
-                         std::string(header.substr(0, 80)) + "\"");
+                     fmt::format("is not among the columns of the header: \"{:.80}\"",
+                                 fmt::format("{}", fmt::join(header, ","))));
   }
   return found;
 }
@@ -133,50 +116,45 @@ Recording Recording::rows(std::ptrdiff_t first, std::ptrdiff_t end) const {
 }
 
 Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name) {
-  const bool ends_with_newline = csv.ends_with('\n');
-  const std::string_view header = next_line(csv);
-  TRY_ASSIGN(const auto at, positions(header));
-  const std::size_t width = cells_of(header).size();
+  TRY_ASSIGN(auto table, telemetry::CsvTable::open(csv, '\0'));
+  TRY_ASSIGN(const auto at, positions(table.header()));
   std::vector<Recording> out;
-  std::string_view cycle;
-  std::size_t line_number = 1;
-  while (!csv.empty()) {
-    ++line_number;
-    const std::string_view line = next_line(csv);
-    if (line.empty()) continue;
-    const auto cells = cells_of(line);
+  std::string cycle;
+  std::vector<std::string_view> cells;
+  for (;;) {
+    const auto row = table.next(cells);
     // A logger that was cut off leaves a last line without its end.
-    if (csv.empty() && !ends_with_newline && cells.size() < width) break;
+    if (row ? !*row : table.place().text.find('\n') == std::string_view::npos) break;
+    if (!row) return tl::unexpected(row.error());
     double value[columns] = {};
     for (std::size_t c = 0; c < cycle_column; ++c) {
       value[c] = std::numeric_limits<double>::quiet_NaN();
-      if (!(at)[c]) continue;
-      const std::string_view cell = *(at)[c] < cells.size() ? cells[*(at)[c]] : std::string_view{};
+      if (!at[c]) continue;
+      const std::string_view cell = trimmed(cells[*at[c]]);
       if (c == temperature_column && (cell.empty() || boost::algorithm::iequals(cell, "nan"))) continue;
       const auto read = to_number<double>(cell);
       if (!read)
         return invalid(
             std::string(column_names[c][0]),
-            fmt::format("is \"{}\" in line {}, must be a finite number", cell.substr(0, 40), line_number));
+            fmt::format("is \"{}\" in line {}, must be a finite number", cell.substr(0, 40), table.line()));
       value[c] = *read;
     }
-    std::string_view line_cycle;
-    if ((at)[cycle_column] && *(at)[cycle_column] < cells.size()) line_cycle = cells[*(at)[cycle_column]];
-    if (out.empty() || line_cycle != cycle) {
-      cycle = line_cycle;
+    const std::string_view row_cycle = at[cycle_column] ? trimmed(cells[*at[cycle_column]]) : "";
+    if (out.empty() || row_cycle != cycle) {
+      cycle = row_cycle;
       out.emplace_back().name = cycle.empty() ? name : fmt::format("{}#{}", name, cycle);
     }
     Recording& recording = out.back();
     if (!recording.time_s.empty() && value[time_column] < recording.time_s.back())
       return invalid("t_s", fmt::format("is {} s in line {}, must not be before the line before, {} s",
-                                        value[time_column], line_number, recording.time_s.back()));
+                                        value[time_column], table.line(), recording.time_s.back()));
     // Loggers that round the time write an extra row at the end of a test in the same second.
     const bool again = !recording.time_s.empty() && value[time_column] == recording.time_s.back();
-    std::vector<double>* const row[] = {&recording.time_s, &recording.current_a, &recording.voltage_v,
-                                        &recording.temperature_c};
+    std::vector<double>* const into[] = {&recording.time_s, &recording.current_a, &recording.voltage_v,
+                                         &recording.temperature_c};
     for (std::size_t c = 0; c < cycle_column; ++c) {
-      if (again) row[c]->pop_back();
-      row[c]->push_back(value[c]);
+      if (again) into[c]->pop_back();
+      into[c]->push_back(value[c]);
     }
   }
   if (out.empty()) return invalid("t_s", "has no rows");

@@ -43,12 +43,12 @@ TEST(Recording, RejectsDamagedTextWithPosition) {
     const char* message;
   };
   for (const Case& item :
-       {Case{"t_s,I_A\n0,0\n", "V_V", "first line"}, Case{"t_s,I_A,V_V\n", "t_s", "no rows"},
+       {Case{"t_s,I_A\n0,0\n", "V_V", "header"}, Case{"t_s,I_A,V_V\n", "t_s", "no rows"},
         Case{"t_s,I_A,V_V\n0,0,4\n", "t_s", "single row"},
         Case{"t_s,I_A,V_V\n0,0,4\n1,x,4\n", "I_A", "line 3"},
         Case{"t_s,I_A,V_V\n0,0,4\n1,nan,4\n", "I_A", "line 3"},
-        Case{"t_s,I_A,V_V\n0,0,4\n1,0\n", "V_V", "line 3"},
-        Case{"t_s,I_A,V_V\n5,0,4\n1,0,4\n", "t_s", "line 3"}, Case{"", "t_s", "first line"}}) {
+        Case{"t_s,I_A,V_V\n0,0,4\n1,0\n", "line 3", "has 2 fields, the header 3"},
+        Case{"t_s,I_A,V_V\n5,0,4\n1,0,4\n", "t_s", "line 3"}, Case{"", "line 1", "header"}}) {
     const auto recordings = parse_recordings(item.text, "x");
     ASSERT_FALSE(recordings) << item.text;
     EXPECT_EQ(recordings.error().field, item.field);
@@ -61,6 +61,12 @@ TEST(Recording, IgnoresBrokenLastLine) {
   ASSERT_TRUE(recordings) << describe(recordings.error());
   EXPECT_THAT(recordings->front().time_s, ElementsAre(0, 10));
   EXPECT_TRUE(std::isnan(recordings->front().temperature_c[0]));
+}
+
+TEST(Recording, AcceptsSemicolonsAndQuotes) {
+  const auto recordings = parse_recordings("\xEF\xBB\xBF\"t_s\";\"I_A\";V_V\n0;0;\"4\"\n\n10; 1;3.9\n", "x");
+  ASSERT_TRUE(recordings) << describe(recordings.error());
+  EXPECT_THAT(recordings->front().voltage_v, ElementsAre(4, 3.9));
 }
 
 TEST(Recording, AcceptsOtherColumnNames) {
