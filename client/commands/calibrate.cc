@@ -20,6 +20,7 @@
 #include "robot/robot_file.h"
 
 namespace joulecast::battery {
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(AtBound, field, bound)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RecordingFit, name, open_circuit, voltage_rms_v)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(PassedOver, name, reason)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Coverage::FastestLeftOut, name, rate_1_h, seen_to_1_h, time_error,
@@ -79,6 +80,7 @@ Json coverage_json(const battery::Coverage& seen) {
 
 Json calibration_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
   return {{"battery", robot::battery_to_json(calibration.battery)},
+          {"at_bounds", calibration.at_bounds},
           {"iterations", calibration.iterations},
           {"recordings", calibration.recordings},
           {"passed_over", calibration.passed_over},
@@ -88,7 +90,9 @@ Json calibration_json(const battery::Calibration& calibration, const battery::Co
 void print_calibration(const battery::Calibration& calibration, const battery::Coverage& seen) {
   const robot::Battery& battery = calibration.battery;
   fmt::print("capacity            {:.4f} Ah\n", battery.capacity_ah * battery.ageing_factor.value_or(1));
-  if (battery.ageing_factor) fmt::print("ageing factor       {:.4f}\n", *battery.ageing_factor);
+  if (battery.ageing_factor)
+    fmt::print("ageing factor       {:.4f} of the rated {:.4g} Ah\n", *battery.ageing_factor,
+               battery.capacity_ah);
   fmt::print("nominal voltage     {:.3f} V, cut-off {:.3f} V\n", battery.nominal_voltage_v,
              *battery.cutoff_voltage_v);
   fmt::print("ohmic resistance    {:.4f} ohm at half charge\n", battery.internal_resistance_ohm);
@@ -100,6 +104,9 @@ void print_calibration(const battery::Calibration& calibration, const battery::C
   if (battery.thermal_resistance_k_w)
     fmt::print("to surroundings     {:.2f} K/W, {:.0f} s\n", *battery.thermal_resistance_k_w,
                *battery.thermal_time_constant_s);
+  for (const battery::AtBound& at : calibration.at_bounds)
+    fmt::print("{} is at the fit's bound, {:.4g}: these recordings do not determine it\n", at.field,
+               at.bound);
   for (const battery::RecordingFit& fit : calibration.recordings)
     fmt::print("{:<32} voltage rms {:5.1f} mV{}\n", fit.name, 1e3 * fit.voltage_rms_v,
                fit.open_circuit ? ", gives the open-circuit voltage" : "");

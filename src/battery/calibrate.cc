@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/median.h"
@@ -125,6 +126,15 @@ struct Layout {
   std::size_t lag_time_constant(std::size_t k) const { return lag(k) + 1; }
   std::size_t activation() const { return share() + 6; }
   std::size_t size() const { return activation() + (with_activation ? 1 : 0); }
+
+  // Of the battery, as a JSON pointer.
+  std::string field(std::size_t at) const {
+    if (at < share()) return fmt::format("/resistance_curve/{}/1", at);
+    if (at < lag(0)) return at == share() ? "/branches/0/resistance_ohm" : "/branches/0/time_constant_s";
+    if (at == activation()) return "/activation_k";
+    const std::size_t k = (at - lag(0)) / 2;
+    return fmt::format("/charge_lags/{}/{}", k, at == lag(k) ? "lag_s" : "time_constant_s");
+  }
 };
 
 // Start and bounds of a fitted parameter.
@@ -372,10 +382,10 @@ struct StepsTold : ceres::IterationCallback {
   const std::function<void(int)>& on_step;
 };
 
-// The parameters of least misfit, within their ranges.
-Result<std::vector<double>> fitted(const Layout& layout, const SlowTest& slow, const robot::Battery& known,
-                                   const std::vector<Target>& targets,
-                                   const std::function<void(int)>& on_step, int& iterations) {
+// The battery of least misfit, its parameters within their ranges.
+Result<void> fit(const Layout& layout, const SlowTest& slow, const robot::Battery& known,
+                 const std::vector<Target>& targets, const std::function<void(int)>& on_step,
+                 Calibration& out) {
   std::vector<double> p(layout.size());
   std::size_t rows = layout.knots.size() - 2;
   for (const Target& target : targets) rows += target.recording->size();
@@ -415,8 +425,18 @@ Result<std::vector<double>> fitted(const Layout& layout, const SlowTest& slow, c
   ceres::Solve(solver, &problem, &summary);
   if (!summary.IsSolutionUsable())
     return fail(Fault::infeasible, "recordings", "the fit found no parameters: " + summary.message);
-  iterations = static_cast<int>(summary.iterations.size());
-  return p;
+  out.iterations = static_cast<int>(summary.iterations.size());
+  out.battery = battery_of(layout, p.data(), slow, known);
+  const auto written = robot::battery_to_json(out.battery);
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const auto at = static_cast<int>(i);
+    if (p[i] > problem.GetParameterLowerBound(p.data(), at) &&
+        p[i] < problem.GetParameterUpperBound(p.data(), at))
+      continue;
+    const std::string field = layout.field(i);
+    out.at_bounds.push_back({field, written.at(nlohmann::json::json_pointer(field)).get<double>()});
+  }
+  return {};
 }
 
 // How far the fitted battery's voltage is from each recording that was used, in the order given.
@@ -454,8 +474,7 @@ Result<Calibration> calibrate(const std::vector<Recording>& given, const Calibra
 
   const Layout layout{resistance_knots(targets, slow.capacity_ah),
                       temperature_span_k(targets) >= least_temperature_span_k};
-  TRY_ASSIGN(const auto p, fitted(layout, slow, known, targets, options.on_step, out.iterations));
-  out.battery = battery_of(layout, p.data(), slow, known);
+  TRY(fit(layout, slow, known, targets, options.on_step, out));
   if (layout.with_activation) {
     if (const auto thermal =
             thermal_fit(targets, Curve(out.battery.open_circuit_voltage), slow.capacity_ah)) {

@@ -32,8 +32,15 @@ struct PassedOver {
   std::string reason;
 };
 
+// A fitted value at its bound: the recordings do not determine it.
+struct AtBound {
+  std::string field;  // of the battery, as "/charge_lags/1/lag_s"
+  double bound = 0;
+};
+
 struct Calibration {
   robot::Battery battery;
+  std::vector<AtBound> at_bounds;
   std::vector<RecordingFit> recordings;
   std::vector<PassedOver> passed_over;
   int iterations = 0;

@@ -91,6 +91,18 @@ TEST(Calibrate, AcceptsRowsWithoutTemperature) {
               0.02 * *expected->battery.thermal_resistance_k_w);
 }
 
+// The slow lag of the truth is beyond the fit's range.
+TEST(Calibrate, ReportsFitsAtBounds) {
+  robot::Battery true_battery = full_battery();
+  true_battery.charge_lags = {{70, 60}, {3000, 2000}};
+  const auto found = calibrate(identification(Circuit(true_battery)));
+  ASSERT_TRUE(found) << describe(found.error());
+  const auto lag = std::ranges::find(found->at_bounds, "/charge_lags/1/lag_s", &AtBound::field);
+  ASSERT_NE(lag, found->at_bounds.end());
+  EXPECT_NEAR(lag->bound, 2000, 1e-6);
+  EXPECT_EQ(lag->bound, found->battery.charge_lags[1].lag_s);
+}
+
 TEST(Calibrate, NamesTheMissingTest) {
   const Circuit truth(full_battery());
   const auto all = identification(truth);
