@@ -235,8 +235,7 @@ void print(const energy::PowerCalibration& fit) {
       "power error of each half of the recordings, predicted from the other: {:.1f} %; robot file {:.1f} %, "
       "linear regression on speed, turning and acceleration {:.1f} %\n",
       1e2 * h.corrected, 1e2 * h.file, 1e2 * h.regression);
-  constexpr double clearly_worse = 1.05;
-  if (h.corrected > clearly_worse * h.regression)
+  if (h.regression_wins())
     fmt::print(
         "The regression predicts better: the power of this robot depends on an effect that its model lacks. "
         "Find it with joulecast gap.\n");

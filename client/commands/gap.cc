@@ -262,7 +262,7 @@ struct GapTest {
   // The objection to writing the corrected file; empty: there is none.
   std::string objection() const {
     if (!replayed.improves()) return "the back-test shows no improvement";
-    if (!beside_regression || !beside_regression->regression_wins()) return {};
+    if (!beside_regression || !beside_regression->missed.regression_wins()) return {};
     const energy::MissedPower& missed = beside_regression->missed;
     return fmt::format(
         "power error on the missions of --test: corrected file {:.1f} %, linear regression on the missions "
@@ -302,7 +302,10 @@ const described::Table<GapTest>& test_table() {
           .number_or_null("file_missed", AT(missed.file), "mean |error| over mean |power| there")
           .number_or_null("corrected_missed", AT(missed.corrected), "with the effects found")
           .number_or_null("regression_missed", AT(missed.regression), "of a linear regression")
-          .value("regression_wins", &R::regression_wins, "the regression predicts better");
+          .number_or_null("lead_sd", AT(missed.lead_sd),
+                          "standard error of corrected_missed - regression_missed")
+          .value("regression_wins", AT(missed.regression_wins()),
+                 "the regression predicts better, by more than lead_sd");
   static const auto table =
       described::Table<GapTest>()
           .include(answers::back_test_table(), &GapTest::replayed)

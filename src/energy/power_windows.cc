@@ -136,13 +136,20 @@ void MissedPowerMeter::add(const windows::Window& window, const dynamics::DriveM
   const double measured_w = window.battery_power_w;
   measured_w_ += std::fabs(measured_w);
   missed_w_.file += std::fabs(measured_w - metered_power_w(file, window));
-  missed_w_.corrected += std::fabs(measured_w - metered_power_w(corrected, window));
-  missed_w_.regression += std::fabs(measured_w - regression.power_w(window));
+  const double by_corrected = std::fabs(measured_w - metered_power_w(corrected, window)),
+               by_regression = std::fabs(measured_w - regression.power_w(window));
+  missed_w_.corrected += by_corrected;
+  missed_w_.regression += by_regression;
+  lead_w_[window.block] += by_corrected - by_regression;
 }
 
 MissedPower MissedPowerMeter::value() const {
-  return {missed_w_.file / measured_w_, missed_w_.corrected / measured_w_,
-          missed_w_.regression / measured_w_};
+  const auto n = static_cast<double>(lead_w_.size());
+  double squares = 0;
+  for (const auto& [block, lead_w] : lead_w_)
+    squares += std::pow(lead_w - (missed_w_.corrected - missed_w_.regression) / n, 2);
+  return {missed_w_.file / measured_w_, missed_w_.corrected / measured_w_, missed_w_.regression / measured_w_,
+          std::sqrt(n / (n - 1) * squares) / measured_w_};
 }
 
 Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, const PowerScale& scale,

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <array>
 #include <cstddef>
+#include <map>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -141,6 +142,9 @@ struct MissedPower {
   double file = 0;        // by the robot file
   double corrected = 0;   // by a model that was fitted to other windows
   double regression = 0;  // by a linear regression on those other windows
+  double lead_sd = 0;     // standard error of corrected - regression, from block to block
+
+  bool regression_wins() const { return corrected - regression > lead_sd; }
 };
 
 // Accumulates it.
@@ -153,6 +157,7 @@ class MissedPowerMeter {
  private:
   double measured_w_ = 0;
   MissedPower missed_w_;
+  std::map<std::size_t, double> lead_w_;  // by block
 };
 
 // Battery power of missions that were not used for a fit, by a robot file, by the file corrected from other
@@ -160,9 +165,6 @@ class MissedPowerMeter {
 struct RegressionComparison {
   std::size_t windows = 0;
   MissedPower missed;
-
-  // Beyond a twentieth, within which either may be ahead by chance.
-  bool regression_wins() const { return missed.corrected > 1.05 * missed.regression; }
 };
 
 // Fault::invalid when power is not measured or too little of it, in either set of missions, or when the

@@ -87,7 +87,7 @@ def halves(programs, options):
         written = os.path.exists(corrected)
         print(f"{learnt} half: {comparison}, {'written' if written else 'refused'}")
         check(comparison["windows"] > 40, "the other half was compared")
-        worse = comparison["corrected_missed"] > 1.05 * comparison["regression_missed"]
+        worse = comparison["corrected_missed"] - comparison["regression_missed"] > comparison["lead_sd"]
         check(worse == comparison["regression_wins"], "the better predictor is reported")
         check(not (written and worse), f"written though the regression predicts better: {comparison}")
         check(written or "--apply: " in done.stderr, f"refused without a reason: {done.stderr}")

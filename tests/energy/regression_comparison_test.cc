@@ -56,7 +56,7 @@ TEST(RegressionComparison, TrueModelBeatsRegression) {
   EXPECT_GT(found->windows, 100u);
   EXPECT_LT(found->missed.corrected, 0.005);
   EXPECT_GT(found->missed.file, 0.05);
-  EXPECT_FALSE(found->regression_wins());
+  EXPECT_FALSE(found->missed.regression_wins());
 }
 
 TEST(RegressionComparison, RegressionWinsOnRegressionPower) {
@@ -72,7 +72,15 @@ TEST(RegressionComparison, RegressionWinsOnRegressionPower) {
   ASSERT_TRUE(found) << describe(found.error());
   EXPECT_LT(found->missed.regression, 0.01);
   EXPECT_GT(found->missed.corrected, 0.1);
-  EXPECT_TRUE(found->regression_wins());
+  EXPECT_TRUE(found->missed.regression_wins());
+}
+
+// Two models that err in turns: neither is ahead by more than chance, in either direction.
+TEST(RegressionComparison, EqualErrorsAreATie) {
+  MissedPower tie{0.01, 0.0043, 0.0040, 0.0005};
+  EXPECT_FALSE(tie.regression_wins());
+  tie.lead_sd = 0.0002;
+  EXPECT_TRUE(tie.regression_wins());
 }
 
 TEST(RegressionComparison, NamesTheMissingData) {
