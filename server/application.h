@@ -24,7 +24,7 @@ class Application {
   // True while the loops of receiving, accounting, writing and HTTP make progress. For the watchdog.
   bool alive();
 
-  // Reads the tokens and the certificate again. One that cannot be read is logged and remains in force.
+  // Reads the tokens and the certificate again. If one cannot be read, that is logged and the old one stays.
   void reload();
 
   // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing. Data that are not

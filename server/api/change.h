@@ -17,7 +17,7 @@ namespace joulecast::api {
 // The change that a request makes: a transaction with its audit entry and, under a key, its answer.
 class RequestChange {
  public:
-  // From the outcome of the change. Called on the writer's thread: refers to nothing that ends before it.
+  // From the outcome of the change, on the writer's thread: refers to nothing that ends before the services.
   using Answer = std::function<Response(std::int64_t outcome)>;
 
   RequestChange(const Services& services, const Request& request) : services_(services), request_(request) {}

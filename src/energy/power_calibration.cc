@@ -312,7 +312,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
   return estimates;
 }
 
-// Parameters that these data do not identify, with the missing data, and those that no data identify.
+// Parameters that these data do not identify, with the missing data, and those that battery power never does.
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
   std::vector<Untold> untold;
   for (Eigen::Index p = 0; p < PowerParameter::count; ++p) {

@@ -19,7 +19,7 @@ namespace joulecast::ingest {
 // The state that survives restarts, besides the refinement's own memory.
 struct RefinementProgress {
   std::int64_t judged = 0;  // missions
-  // Of the carried payload over the declared one, weighted over missions: 1, x, y, x x, x y; ten count most.
+  // Of the carried payload over the declared, weighted: 1, x, y, x x, x y; the newest ten count most.
   std::array<double, 5> payload_sums{};
   std::int64_t changed_utime_us = 0;             // of the change from which on it is refined
   std::size_t tests = 0;                         // of candidates for this version since then

@@ -104,7 +104,7 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
 // Windows of all missions, half overlapping. Channels with held readings have windows of their own, one per
 // reading, after the others of their mission. Where battery power is compared with the motion alone, its
 // windows are rows of new readings that do not overlap, each of half a second or two readings. The motion at
-// a reading is a straight line through the wheel speeds about it, a row's parts are means over its readings.
+// a reading is a straight line through the wheel speeds about it; a row's parts are means over its readings.
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings = {});
