@@ -293,6 +293,21 @@ class Bags(unittest.TestCase):
             self.assertAlmostEqual(had["left"], has["left"], places=9)
             self.assertAlmostEqual(had["x"], has["x"], places=9)
 
+    def test_other_robots_are_left_out(self):
+        lists = {}
+        for robot, samples in (("amr_1", self.samples), ("amr_2", [{**s, "amps": 3 * s["amps"]} for s in self.samples + 99 * self.samples[-1:]])):
+            drive = Drive(samples).all()
+            lists[robot] = [(at, f"/{robot}{topic}", kind, message) for at, topic, kind, message in drive.list]
+        both, own = Drive([]), Drive([])
+        both.list, own.list = lists["amr_2"] + lists["amr_1"], lists["amr_1"]
+        mapping = self.place / "mapping.json"
+        mapping.write_text(json.dumps({"topics": {"wheels": "/amr_1/joint_states"}}))
+        log, text = self.bring(self.mcap(both), "--mapping", mapping)
+        self.assertIn("topics below /amr_2/ are left out", text)
+        self.assertNotIn("packs in parallel", text)
+        self.assert_same(log)
+        self.assertNotIn("left out", self.bring(self.mcap(own))[1])
+
     def test_other_joints_are_passed_over(self):
         drive = Drive(self.samples).all().wheels(name=("shoulder", "elbow"))
         drive.add("/arm/joint_states", "sensor_msgs/JointState", lambda s: {"name": ["gripper"], "position": [1]})

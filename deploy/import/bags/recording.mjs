@@ -10,7 +10,7 @@ const twistOf = (twist) => [twist.linear.x, twist.angular.z];
 const frameOf = (name) => name.replace(/^.*\//, '');
 function linkOf({ header, child_frame_id: child, transform: { translation, rotation } }) {
   const at = [translation.x, translation.y, yawOf(rotation)];
-  return { parent: frameOf(header.frame_id), child: frameOf(child), at };
+  return { parent: frameOf(header.frame_id), child: frameOf(child), at, name: child };
 }
 
 // One list for the equal lists of names that every message repeats.
@@ -172,7 +172,7 @@ export class Recording {
     if (chosen === undefined) {
       const rank = (t) => preferences[role](t, this.robot);
       return able
-        .filter((t) => rank(t) < Infinity)
+        .filter((t) => rank(t) < Infinity && !this.isForeign(t.name))
         .sort((a, b) => rank(a) - rank(b) || b.count - a.count || (a.name < b.name ? -1 : 1));
     }
     const found = able.filter((t) => t.name === chosen);
@@ -183,8 +183,35 @@ export class Recording {
     return found;
   }
 
-  // Rows of [right, left], rad/s, or of positions where no velocity was published.
+  // Whether a topic or frame is in the namespace of another robot.
+  isForeign(name) {
+    return this.foreign?.some((space) => `/${name}`.replace('//', '/').startsWith(space));
+  }
+
+  // Namespaces with a topic like that of the wheels, such as /amr_2/ if the wheels are /amr_1/joint_states.
+  foreignTo(wheels) {
+    const own = wheels.name.split('/');
+    return [...this.topics.values()].flatMap(({ name, kind, rows }) => {
+      const parts = name.split('/');
+      const [at, ...more] = [...own.keys()].filter((k) => own[k] !== parts[k]);
+      if (kind !== wheels.kind || parts.length !== own.length || more.length || !(at < own.length - 1))
+        return [];
+      const sides =
+        kind === 'nav_msgs/Odometry' || this.joints(new Set(rows.flatMap((row) => row.data.name)));
+      return sides === true || (sides.right.length && sides.left.length)
+        ? [`${parts.slice(0, at + 1).join('/')}/`]
+        : [];
+    });
+  }
+
   wheels() {
+    const found = this.findWheels();
+    this.foreign = this.foreignTo(found.topic);
+    return found;
+  }
+
+  // Rows of [right, left], rad/s, or of positions where no velocity was published.
+  findWheels() {
     const namesSeen = new Set();
     for (const topic of this.candidates('wheels')) {
       if (topic.kind === 'nav_msgs/Odometry') {
@@ -268,8 +295,9 @@ export class Recording {
   // Rows of the robot's pose in the map, from all transforms.
   mapPoses() {
     const links = [...this.topics.values()]
-      .filter((topic) => this.wants(topic.type) && isTf(topic))
+      .filter((topic) => this.wants(topic.type) && isTf(topic) && !this.isForeign(topic.name))
       .flatMap((topic) => topic.rows.map((row) => ({ ...row, fixed: /static/.test(topic.name) })))
+      .filter(({ data }) => !this.isForeign(data.name))
       .sort((a, b) => b.fixed - a.fixed || a.receiptUs - b.receiptUs);
     const base = ['base_footprint', 'base_link', 'base'].find((name) =>
       links.some(({ data }) => data.child === name),
@@ -330,6 +358,10 @@ export class Recording {
   // {files: name to text, mapping} for a recording called `stem`.
   tables(stem, robotId) {
     const wheels = this.wheels();
+    if (this.foreign.length)
+      this.warn(
+        `topics below ${list(this.foreign)} are left out, as of other robots; --mapping with {"topics": {"wheels": "..."}} imports them`,
+      );
     this.stamp(wheels.rows, wheels.topic.name);
     // Simulated time counts from zero; the times of receipt may have the date.
     if (wheels.rows[0].timeUs < year2000Us && wheels.rows[0].timeUs + this.lateUs > year2000Us) {
@@ -395,7 +427,8 @@ export class Recording {
     }
     const motors = {};
     for (const topic of this.topics.values()) {
-      if (topic.kind !== 'sensor_msgs/Temperature' || !topic.rows.length) continue;
+      if (topic.kind !== 'sensor_msgs/Temperature' || !topic.rows.length || this.isForeign(topic.name))
+        continue;
       const name = `${topic.name
         .slice(1)
         .replace(/[^\w.-]/g, '_')
