@@ -11,7 +11,7 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   const std::vector<std::size_t> groups = name_groups(group_of_run, c);
   if (c.groups.size() < 2) return invalid("--compare-by", "gives one group only; two are needed to compare");
   RunRows rows(set, robot, std::move(in_file));
-  RunChecks checked = check_runs(rows);
+  RunChecks checked = check_runs(rows, robot);
   c.diagnosis.checks = std::move(checked.checks);
   rows.silence(checked.apart);
   GroupedData grouped{rows.data(), rows.joules(), {}, rows.offsets_j()};

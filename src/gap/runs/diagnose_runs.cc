@@ -34,7 +34,7 @@ class RunDiagnoser {
   RunDiagnosis run() {
     Diagnosis& d = r_.diagnosis;
     measure();
-    RunChecks checked = check_runs(rows_);
+    RunChecks checked = check_runs(rows_, robot_);
     d.checks = std::move(checked.checks);
     const auto contradicted = std::ranges::find(d.checks, true, &Check::contradicted);
     if (contradicted != d.checks.end()) return nothing_to_judge(contradicted->says);

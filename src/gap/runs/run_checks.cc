@@ -107,14 +107,28 @@ RunChecks outliers(const RunRows& rows, const std::string& column) {
   return found;
 }
 
+std::optional<Check> overload(const RunRows& rows, double limit_kg) {
+  const auto& run =
+      *std::ranges::max_element(rows.runs(), {}, [](const MissionRun& r) { return r.at.payload_kg; });
+  if (!(run.at.payload_kg > limit_kg)) return std::nullopt;
+  return Check{"payload_over_limit",
+               "payload_kg",
+               run.at.payload_kg / limit_kg,
+               {windows::missing, windows::missing},
+               fmt::format("payload_kg of run {} is {}, the file's limits.payload_kg {}: is it in kg?",
+                           run.name, brief(run.at.payload_kg), brief(limit_kg))};
+}
+
 }  // namespace
 
-RunChecks check_runs(const RunRows& rows) {
+RunChecks check_runs(const RunRows& rows, const robot::RobotModel& robot) {
   const std::string column = rows.by_motor() ? "right_j, left_j" : "energy_j";
   for (const auto check : {other_unit, constant}) {
     if (auto found = check(rows, column)) return {{std::move(*found)}, {}};
   }
-  return outliers(rows, column);
+  RunChecks found = outliers(rows, column);
+  if (auto over = overload(rows, robot.limits.payload_kg)) found.checks.push_back(std::move(*over));
+  return found;
 }
 
 }  // namespace joulecast::gap

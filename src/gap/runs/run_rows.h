@@ -50,11 +50,12 @@ class RunRows {
 };
 
 // Faults of a table of runs, found before any effect is estimated: energies in another unit, or constant over
-// all runs, which contradicts all of them; single runs that are far from the prediction of all others.
+// all runs, which contradicts all of them; a payload that the robot file does not permit; single runs that
+// are far from the prediction of all others.
 struct RunChecks {
   std::vector<Check> checks;
   std::vector<std::size_t> apart;  // runs that are far from the others
 };
-RunChecks check_runs(const RunRows& rows);
+RunChecks check_runs(const RunRows& rows, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap

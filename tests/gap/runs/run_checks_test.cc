@@ -57,6 +57,14 @@ TEST(RunChecks, ReportsConstantEnergies) {
 }
 
 // One run in 40 is short with little energy, or has tenfold energy. It is named and does not bias the load.
+TEST(RunChecks, ReportsPayloadOverLimit) {
+  const Diagnosis d = checked_runs([](RunSet& set) { set.runs[7].at.payload_kg = 5000; }).diagnosis;
+  const auto over = std::ranges::find(d.checks, "payload_over_limit", &Check::id);
+  ASSERT_NE(over, d.checks.end());
+  EXPECT_TRUE(over->says.starts_with("payload_kg of run ")) << over->says;
+  EXPECT_FALSE(over->contradicted);
+}
+
 TEST(RunChecks, NamesOutlierRun) {
   for (const bool small : {true, false}) {
     const RunDiagnosis r = checked_runs([&](RunSet& set) {
