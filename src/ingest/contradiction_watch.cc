@@ -141,8 +141,9 @@ void ContradictionWatch::judge_messages() {
     const auto k = static_cast<std::size_t>(t.fault);
     const double share = static_cast<double>(faults_[k]) / static_cast<double>(messages_);
     if (share < telemetry::mistaken_share) continue;
-    std::string says = fmt::format("{} of {} messages {}{}.", faults_[k], messages_, t.says,
+    std::string says = fmt::format("{} of {} messages {}{}", faults_[k], messages_, t.says,
                                    why_[k].empty() ? "" : " (" + why_[k] + ")");
+    if (!says.ends_with('?')) says += '.';
     found.push_back({t.kind, t.id, t.channel, share, std::move(says), t.untrue});
     if (t.untrue && in_mission_ && !told_in(untrue_messages_, found.back()))
       untrue_messages_.push_back(found.back());

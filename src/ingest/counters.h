@@ -22,10 +22,10 @@ enum class IngestFault : std::size_t {
   unknown_robot,    // no model: its samples are not accounted
   implausible,      // a value is missing, infinite or absurd
   impossible,       // a reading that this robot cannot have; the sample is accounted for without it
-  duplicate,
-  late,     // out of order, older than the last accounted sample or a covariate's present value
-  missing,  // sequence numbers that never came (or came late)
-  restart,  // the robot's sequence restarted
+  duplicate,        // a sample or a mission event
+  late,             // out of order, older than the last accounted sample or a covariate's present value
+  missing,          // sequence numbers that never came (or came late)
+  restart,          // the robot's sequence restarted
   clock_backward,
   clock_forward,
   clock_ahead,        // stamped well after the daemon's time; accounted for all the same
@@ -38,7 +38,7 @@ enum class IngestFault : std::size_t {
   gap,                // a silence too long to be bridged
   zero_payload,       // payload 0 though the mission's start declared a load, which is accounted for
   outside_mission,    // belongs to no mission: just after an end, or before a start
-  bad_event,          // duplicate, out-of-order or unknown mission event
+  bad_event,          // out-of-order or unknown mission event
   event_flood,        // more mission events than the setting allows
   empty_mission,      // ended before its first sample; not stored
   reused_mission_id,  // a mission began under an id that an earlier one had

@@ -607,10 +607,8 @@ void RobotSession::take(const signals::MissionEvent& event, bool requested) {
   else if (after.out_of_order_events > before.out_of_order_events)
     why = "an event of mission " + event.mission_id +
           " is stamped before the start of the open mission, or after its own end";
-  const bool repeated = after.duplicate_events > before.duplicate_events;
-  if (repeated && !snapshot_.fault_notes.contains(name_of(IngestFault::bad_event)))
-    why = "an event of mission " + event.mission_id + " is repeated";
-  if ((!why.empty() || repeated) && !repeats_) on_fault(IngestFault::bad_event, 1, std::move(why));
+  if (after.duplicate_events > before.duplicate_events && !repeats_) on_fault(IngestFault::duplicate);
+  if (!why.empty() && !repeats_) on_fault(IngestFault::bad_event, 1, std::move(why));
   changed_ = true;
 }
 

@@ -523,7 +523,8 @@ TEST_F(PipelineTest, ReusedIdIsAnotherMission) {
     EXPECT_NEAR(mission.accounts.measured_j, 48 * 2.0, 1e-6);
   }
   EXPECT_EQ(harness.faults(IngestFault::reused_mission_id), 2u);
-  EXPECT_EQ(harness.faults(IngestFault::bad_event), 3u);
+  EXPECT_EQ(harness.faults(IngestFault::duplicate), 3u);
+  EXPECT_EQ(harness.faults(IngestFault::bad_event), 0u);
   const auto events = harness.store->events(0, 100);
   ASSERT_TRUE(events);
   std::vector<std::string> told;
