@@ -62,8 +62,9 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
   if (auto model = services.models.find(robot_id)) return model;
   if (services.fleet.find(robot_id) == nullptr)
     return tl::unexpected(ingest::unknown_robot(std::move(field), robot_id));
-  return fail(Fault::not_found, std::move(field),
-              "robot " + robot_id + " publishes telemetry but has no robot file yet");
+  return fail(
+      Fault::not_found, std::move(field),
+      "robot " + robot_id + " has sent telemetry, but has no robot file: it was removed, or never added");
 }
 
 described::Schemas schemas() {

@@ -75,7 +75,8 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
          std::string failures;
          for (const auto& [name, check] : *shared) {
            if (const auto result = check(); !result)
-             failures += (failures.empty() ? "" : "; ") + name + ": " + describe(result.error());
+             failures += (failures.empty() ? "" : "; ") + name + ": " +
+                         (result.error().field == name ? result.error().message : describe(result.error()));
            names.push_back(name);
          }
          if (!failures.empty()) return fail(Fault::unavailable, "", "not ready: " + failures);

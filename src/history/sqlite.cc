@@ -30,9 +30,7 @@ SqlError::Kind kind_of(int code) {
   return internal;
 }
 
-[[noreturn]] void raise_error(sqlite3* database, int code, std::string_view doing) {
-  std::string message(doing);
-  message += ": ";
+[[noreturn]] void raise_error(sqlite3* database, int code, std::string message = {}) {
   message += database ? sqlite3_errmsg(database) : sqlite3_errstr(code);
   throw SqlError(kind_of(code), message);
 }
@@ -42,7 +40,7 @@ class SqliteStatement final : public Statement {
   SqliteStatement(sqlite3* database, std::string_view sql) {
     const int code = sqlite3_prepare_v3(database, sql.data(), static_cast<int>(sql.size()),
                                         SQLITE_PREPARE_PERSISTENT, &handle_, nullptr);
-    if (code != SQLITE_OK) raise_error(database, code, "cannot prepare a statement");
+    if (code != SQLITE_OK) raise_error(database, code, "cannot prepare a statement: ");
   }
   ~SqliteStatement() override { sqlite3_finalize(handle_); }
 
@@ -65,7 +63,7 @@ class SqliteStatement final : public Statement {
   bool step() override {
     const int code = sqlite3_step(handle_);
     if (code == SQLITE_ROW) return true;
-    if (code != SQLITE_DONE) raise_error(sqlite3_db_handle(handle_), code, "database");
+    if (code != SQLITE_DONE) raise_error(sqlite3_db_handle(handle_), code);
     return false;
   }
   void step_later() override {
@@ -96,7 +94,7 @@ class SqliteStatement final : public Statement {
 
  private:
   void check(int code) const {
-    if (code != SQLITE_OK) raise_error(sqlite3_db_handle(handle_), code, "database");
+    if (code != SQLITE_OK) raise_error(sqlite3_db_handle(handle_), code);
   }
 
   sqlite3_stmt* handle_ = nullptr;
@@ -135,7 +133,7 @@ SqliteDatabase::~SqliteDatabase() {
 
 void SqliteDatabase::execute(const std::string& sql) {
   const int code = sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr);
-  if (code != SQLITE_OK) raise_error(handle_, code, "database");
+  if (code != SQLITE_OK) raise_error(handle_, code);
 }
 
 std::unique_ptr<Statement> SqliteDatabase::prepare(std::string_view sql) {
