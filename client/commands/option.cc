@@ -136,11 +136,8 @@ Result<std::int64_t> parse_time(const std::string& text, const std::string& opti
 }
 
 Result<std::int64_t> parse_end_time(const std::string& text, const std::string& option) {
-  constexpr std::int64_t day_us = 86'400'000'000;
-  const bool day_alone = text.size() == date_length && parse_utc(text);
-  return parse_time(text, option).map([&](std::int64_t utime_us) {
-    return day_alone ? utime_us + day_us : utime_us;
-  });
+  if (const auto parsed = parse_utc_end(text)) return *parsed;
+  return parse_time(text, option);
 }
 
 Value time_value() {

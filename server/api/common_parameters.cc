@@ -30,12 +30,13 @@ Parameter digits_parameter() {
           .maximum = http::all_digits};
 }
 
-Parameter limit_parameter(std::string things, std::int64_t maximum) {
+Parameter limit_parameter(const std::string& things, std::int64_t usual, std::int64_t maximum) {
   return {.name = "limit",
           .type = Parameter::Type::integer,
-          .description = std::move(things),
+          .description = things,
           .minimum = 1,
-          .maximum = static_cast<double>(maximum)};
+          .maximum = static_cast<double>(maximum),
+          .usual = static_cast<double>(usual)};
 }
 
 Parameter cursor_parameter() {
@@ -51,9 +52,8 @@ Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
 }
 
 std::pair<std::vector<std::string>, std::string> page_of_ids(const http::Request& request,
-                                                             const std::set<std::string>& ids,
-                                                             std::int64_t limit) {
-  const history::PageRequest wanted = page_of(request, limit);
+                                                             const std::set<std::string>& ids) {
+  const history::PageRequest wanted = page_of(request);
   std::vector<std::string> page;
   auto next = ids.upper_bound(wanted.cursor);
   while (std::cmp_less(page.size(), wanted.limit) && next != ids.end()) page.push_back(*next++);
@@ -63,12 +63,10 @@ std::pair<std::vector<std::string>, std::string> page_of_ids(const http::Request
 
 std::vector<Parameter> log_parameters(std::string kinds, std::string_view usual_order) {
   std::string order_words = "asc: oldest first; desc: newest first; default: ";
-  const std::vector<Parameter> times = with(time_parameters("from", "only entries from this time on"),
-                                            time_parameters("to", "only entries before this time"));
-  return with(times,
+  return with(range_parameters("entries"),
               {{.name = "kind", .description = std::move(kinds) + ", or these, separated by commas"},
                {.name = "order", .description = order_words.append(usual_order), .choices = {"asc", "desc"}},
-               limit_parameter("entries a page", history::max_page_size),
+               limit_parameter("entries a page", 100, history::max_page_size),
                cursor_parameter()});
 }
 
@@ -77,19 +75,17 @@ Result<LogQuery> log_query(const http::Request& request, std::string_view usual_
   history::LogFilter& filter = query.filter;
   TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
   filter.kinds = http::listed(request.query_value("kind").value_or(""));
-  TRY_ASSIGN(const auto from, time_of(request, "from"));
-  TRY_ASSIGN(const auto to, time_of(request, "to"));
-  filter.range = {from.value_or(history::whole_past), to.value_or(history::whole_future)};
+  TRY_ASSIGN(filter.range, range_of(request));
   filter.newest_first = request.query_value("order").value_or(usual_order) == "desc";
   TRY_ASSIGN(const auto cursor, id_cursor(request));
   query.behind_id = cursor.value_or(filter.newest_first ? history::whole_future : 0);
-  query.limit = request.query_integer("limit").value_or(100);
+  query.limit = *request.query_integer("limit");
   return query;
 }
 
-history::PageRequest page_of(const http::Request& request, std::int64_t limit) {
+history::PageRequest page_of(const http::Request& request) {
   history::PageRequest page;
-  page.limit = request.query_integer("limit").value_or(limit);
+  page.limit = *request.query_integer("limit");
   page.cursor = std::string(request.query_value("cursor").value_or(""));
   return page;
 }
@@ -108,21 +104,37 @@ Result<std::vector<std::string>> robot_ids_of(const http::Request& request) {
   return ids;
 }
 
-std::vector<Parameter> time_parameters(const std::string& name, const std::string& what) {
-  return {{.name = name, .description = what + ", " + std::string(utc_forms)},
-          {.name = name + "_utime_us",
-           .type = Parameter::Type::integer,
-           .description = "the same in microseconds since 1970"}};
+std::vector<Parameter> range_parameters(const std::string& things) {
+  const std::string forms(utc_forms);
+  const auto as_number = [](std::string name) {
+    return Parameter{.name = std::move(name),
+                     .type = Parameter::Type::integer,
+                     .description = "the same in microseconds since 1970"};
+  };
+  return {{.name = "from", .description = "only " + things + " from this time on, " + forms},
+          as_number("from_utime_us"),
+          {.name = "to",
+           .description = "only " + things + " before this time, " + forms + "; a date includes that day"},
+          as_number("to_utime_us")};
 }
 
-Result<std::optional<std::int64_t>> time_of(const http::Request& request, const std::string& name) {
-  const auto text = request.query_value(name);
-  const auto utime_us = request.query_integer(name + "_utime_us");
-  if (!text) return utime_us;
-  if (utime_us) return invalid(name, "must not be given with " + name + "_utime_us");
-  const auto parsed = parse_utc(*text);
-  if (!parsed) return invalid(name, "is \"" + std::string(*text) + "\", must be " + std::string(utc_forms));
-  return parsed;
+Result<history::TimeRange> range_of(const http::Request& request) {
+  history::TimeRange range;
+  const auto read = [&](const std::string& name, auto parse, std::int64_t& time) -> Result<std::string> {
+    const auto text = request.query_value(name);
+    const std::string number = name + "_utime_us";
+    const auto utime_us = request.query_integer(number);
+    if (text && utime_us) return invalid(name, "must not be given with " + number);
+    const auto parsed = text ? parse(*text) : utime_us;
+    if (text && !parsed)
+      return invalid(name, "is \"" + std::string(*text) + "\", must be " + std::string(utc_forms));
+    time = parsed.value_or(time);
+    return text ? name : number;
+  };
+  TRY_ASSIGN(const auto from, read("from", parse_utc, range.from_utime_us));
+  TRY_ASSIGN(const auto to, read("to", parse_utc_end, range.to_utime_us));
+  if (range.from_utime_us <= range.to_utime_us) return range;
+  return invalid(from, "must not be later than " + to);
 }
 
 }  // namespace joulecast::api

@@ -27,7 +27,7 @@ Result<std::int64_t> path_id(const http::Request& request, std::string_view thin
 http::Parameter digits_parameter();
 
 // ?limit=: largest number of `things`, e.g. "missions a page", in the response.
-http::Parameter limit_parameter(std::string things, std::int64_t maximum);
+http::Parameter limit_parameter(const std::string& things, std::int64_t usual, std::int64_t maximum);
 
 // ?cursor=: the next_cursor of the page before.
 http::Parameter cursor_parameter();
@@ -73,13 +73,12 @@ http::Response csv_response(const http::Request& request, const std::string& nam
     write_item(json, item, write);
     csv.row(json.text());
   }
-  return csv.response(name, request, cursor);
+  return csv.response(name, cursor);
 }
 
 // The page of ids that ?cursor= and ?limit= select, and the next cursor; empty: it is the last.
 std::pair<std::vector<std::string>, std::string> page_of_ids(const http::Request& request,
-                                                             const std::set<std::string>& ids,
-                                                             std::int64_t limit);
+                                                             const std::set<std::string>& ids);
 
 // Of a log of events or requests: ?kind= with `kinds`, ?order= and default, ?from=, ?to=, ?limit=, ?cursor=.
 std::vector<http::Parameter> log_parameters(std::string kinds, std::string_view usual_order);
@@ -91,17 +90,17 @@ struct LogQuery {
 Result<LogQuery> log_query(const http::Request& request, std::string_view usual_order);
 
 // ?limit= and ?cursor= of a list that the store pages.
-history::PageRequest page_of(const http::Request& request, std::int64_t limit);
+history::PageRequest page_of(const http::Request& request);
 
 std::vector<http::Parameter> with(std::vector<http::Parameter> parameters, std::vector<http::Parameter> more);
 
 // ?robot_id=: ids separated by commas; empty where it is absent. Fault::invalid where it names none.
 Result<std::vector<std::string>> robot_ids_of(const http::Request& request);
 
-// ?<name>= in ISO 8601 and ?<name>_utime_us=: one time in either form. `what` begins the description.
-std::vector<http::Parameter> time_parameters(const std::string& name, const std::string& what);
-// The time in microseconds since 1970; nothing if both are absent. Fault::invalid for text in another form
-// and if both are present.
-Result<std::optional<std::int64_t>> time_of(const http::Request& request, const std::string& name);
+// ?from= and ?to= in ISO 8601, or ?from_utime_us= and ?to_utime_us=. `things` are limited to the range.
+std::vector<http::Parameter> range_parameters(const std::string& things);
+// The range, unlimited where it has no parameter. Fault::invalid for text in another form, for a time in both
+// forms, and for a beginning after the end.
+Result<history::TimeRange> range_of(const http::Request& request);
 
 }  // namespace joulecast::api

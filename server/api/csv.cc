@@ -101,24 +101,13 @@ void Csv::row(const std::string& item) {
   end_row();
 }
 
-http::Response Csv::response(const std::string& name) {
+http::Response Csv::response(const std::string& name, std::string_view next_cursor) {
   http::Response response;
   response.content_type = "text/csv; charset=utf-8; header=present";
   response.headers.emplace_back("Content-Disposition", "attachment; filename=\"joulecast-" + name + ".csv\"");
   response.body = std::move(text_);
+  response.next_cursor = next_cursor;
   return response;
-}
-
-http::Response Csv::response(const std::string& name, const http::Request& request,
-                             std::string_view next_cursor) {
-  http::Response made = response(name);
-  if (next_cursor.empty()) return made;
-  std::string link = "<" + std::string(request.target.substr(0, request.target.find('?'))) + "?";
-  for (const auto& [key, value] : request.query)
-    if (key != "cursor") link += percent_encoded(key) + "=" + percent_encoded(value) + "&";
-  link += "cursor=" + percent_encoded(next_cursor) + ">; rel=\"next\"";
-  made.headers.emplace_back("Link", std::move(link));
-  return made;
 }
 
 }  // namespace joulecast::api

@@ -29,11 +29,8 @@ class Csv {
   // A row of an item's JSON. Null: an empty field; an array: texts with blanks between; an object: JSON.
   void row(const std::string& item);
 
-  // `name` is the file's name without its extension.
-  http::Response response(const std::string& name);
-  // The same for a page of a list; the header Link contains the next page, if any (RFC 8288, rel="next").
-  http::Response response(const std::string& name, const http::Request& request,
-                          std::string_view next_cursor);
+  // `name` is the file's name without its extension; next_cursor that of a page of a list.
+  http::Response response(const std::string& name, std::string_view next_cursor = {});
 
  private:
   void separate() {

@@ -132,7 +132,7 @@ Result<Response> cancel(Services& services, const Request& request) {
 Result<Response> list_diagnoses(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
-  const std::int64_t limit = request.query_integer("limit").value_or(50);
+  const std::int64_t limit = *request.query_integer("limit");
   TRY_ASSIGN(const auto cursor, id_cursor(request));
   TRY_ASSIGN(const auto found,
              services.store.diagnoses(robot, cursor.value_or(history::whole_future), limit));
@@ -237,7 +237,7 @@ Part diagnosis_part() {
   rows.add(Method::get, "/v1/diagnoses", "listDiagnoses", Role::read,
            "Diagnoses, newest first, without their whole results", "diagnosis-list", list_diagnoses,
            {.parameters = {{.name = "robot_id", .description = "only of this robot"},
-                           limit_parameter("diagnoses a page", history::max_page_size),
+                           limit_parameter("diagnoses a page", 50, history::max_page_size),
                            cursor_parameter()},
             .csv = true,
             .rounded = true});

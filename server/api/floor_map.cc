@@ -137,10 +137,7 @@ const Table<FloorAnswer>& floor_map_table() {
 Result<Response> floor_map(const Services& services, const Request& request) {
   history::MissionFilter filter;
   TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
-  TRY_ASSIGN(const auto from, time_of(request, "from"));
-  TRY_ASSIGN(const auto to, time_of(request, "to"));
-  filter.start_from_utime_us = from;
-  filter.start_to_utime_us = to;
+  TRY_ASSIGN(filter.started, range_of(request));
   const double cell_m = request.query_number("cell_m").value_or(usual_cell_m);
   answers::FloorMapper mapper(cell_m);
   TRY_ASSIGN(const auto read, services.store.floor_visits(filter, cell_m, history::max_floor_points,
@@ -149,7 +146,7 @@ Result<Response> floor_map(const Services& services, const Request& request) {
                                                                    mapper.add(mission);
                                                           }));
   TRY_ASSIGN(const auto map, mapper.finish(read));
-  const auto limit = static_cast<std::size_t>(request.query_integer("limit").value_or(usual_cells));
+  const auto limit = static_cast<std::size_t>(*request.query_integer("limit"));
   if (request.csv)
     return csv_response(request, "floor-map",
                         {"x_m", "y_m", "missions", "robots", "covered_s", "distance_m", "energy_j",
@@ -169,8 +166,7 @@ Part floor_map_part() {
            "missions is evaluated",
            "floor-map", floor_map,
            {.parameters = with(
-                with(time_parameters("from", "only missions that started at or after this time"),
-                     time_parameters("to", "only missions that started before this time")),
+                range_parameters("missions that started"),
                 {{.name = "robot_id",
                   .description = "only this robot, or these, separated by commas: those that share a map"},
                  {.name = "cell_m",
@@ -178,7 +174,7 @@ Part floor_map_part() {
                   .description = "side of a square, m; 1 if absent",
                   .minimum = history::least_floor_cell_m,
                   .maximum = history::greatest_floor_cell_m},
-                 limit_parameter("squares, the longest visited first; 10000 if absent", most_cells)}),
+                 limit_parameter("squares, the longest visited first", usual_cells, most_cells)}),
             .csv = true,
             .rounded = true});
   return {std::move(rows), {{"floor-map", floor_map_table().schema()}}};

@@ -105,8 +105,8 @@ const Table<GapHistory>& gap_history_table() {
 Result<Response> gap_history(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY_ASSIGN(const auto model, model_of(services, id));
-  TRY_ASSIGN(auto missions, services.drift.missions(
-                                id, static_cast<std::size_t>(request.query_integer("limit").value_or(500))));
+  TRY_ASSIGN(auto missions,
+             services.drift.missions(id, static_cast<std::size_t>(*request.query_integer("limit"))));
   if (request.csv)
     return csv_response(
         request, "robot-" + id + "-gap-history",
@@ -151,7 +151,7 @@ Part gap_history_part() {
            "Measured over modelled energy of a robot's missions with marks where it drifted, the models "
            "adopted, and the robots of its kind",
            "gap-history", gap_history,
-           {.parameters = {limit_parameter("missions, newest first", max_gap_missions)},
+           {.parameters = {limit_parameter("missions, newest first", 500, max_gap_missions)},
             .csv = true,
             .rounded = true,
             .error_statuses = {404}});

@@ -29,10 +29,7 @@ Result<history::MissionFilter> filter_of(const Request& request) {
   TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
   if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
   if (const auto part = request.query_value("name_contains")) filter.name_contains = std::string(*part);
-  TRY_ASSIGN(const auto from, time_of(request, "from"));
-  TRY_ASSIGN(const auto to, time_of(request, "to"));
-  filter.start_from_utime_us = from;
-  filter.start_to_utime_us = to;
+  TRY_ASSIGN(filter.started, range_of(request));
   filter.incomplete = request.query_boolean("incomplete");
   filter.payload_min_kg = request.query_number("payload_min_kg");
   filter.payload_max_kg = request.query_number("payload_max_kg");
@@ -51,27 +48,25 @@ std::vector<Parameter> filter_parameters() {
                      .description = "only missions with " + std::move(what),
                      .minimum = minimum};
   };
-  const std::vector<Parameter> times =
-      with(time_parameters("from", "only missions that started at or after this time"),
-           time_parameters("to", "only missions that started before this time"));
   return with(
-      times, {
-                 {.name = "robot_id",
-                  .description = "only missions of this robot, or of these, separated by commas"},
-                 {.name = "mission_id", .description = "only missions that the robot called so"},
-                 {.name = "name_contains",
-                  .description = "only missions with this text within mission_id; ASCII letters in any case"},
-                 {.name = "state",
-                  .description = "only missions in this state",
-                  .choices = {std::begin(state_names), std::end(state_names)}},
-                 {.name = "incomplete",
-                  .type = Type::boolean,
-                  .description = "only missions with (true) or without (false) unmeasured parts"},
-                 bound("payload_min_kg", "at least this payload", 0),
-                 bound("payload_max_kg", "at most this payload", 0),
-                 bound("ratio_min", "at least this ratio of measured to modelled energy", std::nullopt),
-                 bound("ratio_max", "at most this ratio of measured to modelled energy", std::nullopt),
-             });
+      range_parameters("missions that started"),
+      {
+          {.name = "robot_id",
+           .description = "only missions of this robot, or of these, separated by commas"},
+          {.name = "mission_id", .description = "only missions that the robot called so"},
+          {.name = "name_contains",
+           .description = "only missions with this text within mission_id; ASCII letters in any case"},
+          {.name = "state",
+           .description = "only missions in this state",
+           .choices = {std::begin(state_names), std::end(state_names)}},
+          {.name = "incomplete",
+           .type = Type::boolean,
+           .description = "only missions with (true) or without (false) unmeasured parts"},
+          bound("payload_min_kg", "at least this payload", 0),
+          bound("payload_max_kg", "at most this payload", 0),
+          bound("ratio_min", "at least this ratio of measured to modelled energy", std::nullopt),
+          bound("ratio_max", "at most this ratio of measured to modelled energy", std::nullopt),
+      });
 }
 
 std::vector<Parameter> sort_parameters() {
@@ -105,8 +100,7 @@ std::vector<std::string> with_accounts(std::vector<std::string> columns,
 
 Result<Response> list_missions(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
-  TRY_ASSIGN(history::MissionPage found,
-             services.store.missions(filter, page_of(request, 50), sort_of(request)));
+  TRY_ASSIGN(history::MissionPage found, services.store.missions(filter, page_of(request), sort_of(request)));
   if (request.csv)
     return csv_response(
         request, "missions",
@@ -257,14 +251,14 @@ Result<Response> tariff(const Services& services, const Request&) {
 
 Part mission_list_part() {
   Rows rows;
-  rows.add(
-      Method::get, "/v1/missions", "listMissions", Role::read,
-      "Missions, newest first or sorted, in pages that stay stable while missions come", "mission-page",
-      list_missions,
-      {.parameters = with(with(filter_parameters(), sort_parameters()),
-                          {limit_parameter("missions a page", history::max_page_size), cursor_parameter()}),
-       .csv = true,
-       .rounded = true});
+  rows.add(Method::get, "/v1/missions", "listMissions", Role::read,
+           "Missions, newest first or sorted, in pages that stay stable while missions come", "mission-page",
+           list_missions,
+           {.parameters =
+                with(with(filter_parameters(), sort_parameters()),
+                     {limit_parameter("missions a page", 50, history::max_page_size), cursor_parameter()}),
+            .csv = true,
+            .rounded = true});
   rows.add(
       Method::get, "/v1/mission-totals", "totalMissions", Role::read,
       "Sums of energy and ledger over the selected missions, optionally by group", "mission-totals", totals,

@@ -31,9 +31,8 @@ struct Span {
 
 Result<Span> span_of(const Request& request) {
   TRY_ASSIGN(const history::MissionKey key, path_id(request, "mission"));
-  TRY_ASSIGN(const auto from, time_of(request, "from"));
-  TRY_ASSIGN(const auto to, time_of(request, "to"));
-  return Span{key, {from.value_or(history::whole_past), to.value_or(history::whole_future)}};
+  TRY_ASSIGN(const history::TimeRange range, range_of(request));
+  return Span{key, range};
 }
 
 Result<history::Mission> mission_of(const Services& services, const Request& request) {
@@ -135,7 +134,7 @@ Response covariates_csv(const Request& request, const history::CovariatePage& pa
   for (const signals::CovariateSeries& series : signals::series_of(page.changes))
     for (std::size_t k = 0; k < series.value.size(); ++k)
       csv.field(series.name).field(series.utime_us[k]).exact(series.value[k]).end_row();
-  return csv.response("mission-" + std::to_string(key) + "-covariates", request, page.next_cursor);
+  return csv.response("mission-" + std::to_string(key) + "-covariates", page.next_cursor);
 }
 
 const Table<history::Mission>& mission_ledger_table() {
@@ -183,7 +182,7 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
     for (const double* number : signals::numbers_of(sample)) csv.exact(*number);
     csv.end_row();
   }
-  return csv.response("mission-" + std::to_string(key) + "-telemetry", request, page.next_cursor);
+  return csv.response("mission-" + std::to_string(key) + "-telemetry", page.next_cursor);
 }
 
 struct TraceAnswer {
@@ -253,8 +252,7 @@ const Table<TraceAnswer>& trace_table() {
 
 Result<Response> trace(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
-  TRY_ASSIGN(const auto found,
-             services.store.trace(span.key, span.range, request.query_integer("points").value_or(1000)));
+  TRY_ASSIGN(const auto found, services.store.trace(span.key, span.range, *request.query_integer("points")));
   if (request.csv) return trace_csv(request, found, span.key);
   return http::json_response(trace_table().text({span.key, found}));
 }
@@ -324,7 +322,7 @@ const Table<TelemetryAnswer>& telemetry_table() {
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
-  TRY_ASSIGN(const auto found, services.store.telemetry(span.key, span.range, page_of(request, 1000)));
+  TRY_ASSIGN(const auto found, services.store.telemetry(span.key, span.range, page_of(request)));
   if (request.csv) return telemetry_csv(request, found, span.key);
   return http::json_response(telemetry_table().text({span.key, found}));
 }
@@ -354,7 +352,7 @@ const Table<CovariatesAnswer>& covariates_table() {
 
 Result<Response> covariates(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
-  TRY_ASSIGN(const auto found, services.store.covariates(span.key, span.range, page_of(request, 1000)));
+  TRY_ASSIGN(const auto found, services.store.covariates(span.key, span.range, page_of(request)));
   if (request.csv) return covariates_csv(request, found, span.key);
   return http::json_response(covariates_table().text({span.key, found}));
 }
@@ -364,8 +362,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
 // A table, as long as its rows.
 Part mission_part() {
   using Type = Parameter::Type;
-  const std::vector<Parameter> span =
-      with(time_parameters("from", "from this time on"), time_parameters("to", "before this time"));
+  const std::vector<Parameter> span = range_parameters("data");
   Rows rows;
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}",
@@ -402,20 +399,21 @@ Part mission_part() {
                                   .type = Type::integer,
                                   .description = "largest number of intervals",
                                   .minimum = 1,
-                                  .maximum = static_cast<double>(history::max_trace_points)}}),
+                                  .maximum = static_cast<double>(history::max_trace_points),
+                                  .usual = 1000}}),
        .csv = true,
        .rounded = true,
        .etag = true,
        .error_statuses = {404}});
   rows.add(Method::get, "/v1/missions/{id}/telemetry", "getMissionTelemetry", Role::read,
            "The samples of a mission as received, within the retention", "mission-telemetry", raw_telemetry,
-           {.parameters = with(span, {limit_parameter("samples a page", history::max_telemetry_samples),
+           {.parameters = with(span, {limit_parameter("samples a page", 1000, history::max_telemetry_samples),
                                       cursor_parameter()}),
             .csv = true,
             .error_statuses = {404}});
   rows.add(Method::get, "/v1/missions/{id}/covariates", "getMissionCovariates", Role::read,
            "Changes of a mission's covariates, within the retention", "mission-covariates", covariates,
-           {.parameters = with(span, {limit_parameter("changes a page", history::max_telemetry_samples),
+           {.parameters = with(span, {limit_parameter("changes a page", 1000, history::max_telemetry_samples),
                                       cursor_parameter()}),
             .csv = true,
             .etag = true,

@@ -301,7 +301,7 @@ const Table<ProposalAnswer>& proposal_table() {
 Result<Response> proposals_of(const Services& services, const Request& request,
                               const std::optional<std::string>& id) {
   TRY_ASSIGN(const auto cursor, id_cursor(request));
-  const std::int64_t limit = request.query_integer("limit").value_or(50);
+  const std::int64_t limit = *request.query_integer("limit");
   TRY_ASSIGN(const auto found, services.store.proposals(id, cursor.value_or(history::whole_future), limit));
   const std::string next = next_id_cursor(found, limit, &history::Proposal::id);
   const auto dismissed = dismissals(services, found);
@@ -349,18 +349,20 @@ Part model_part() {
                             .minimum = 1}},
             .etag = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/robots/{id}/proposals", "listProposals", Role::read,
-           "Model proposals for a robot, newest first", "proposal-list", proposals,
-           {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
-            .csv = true,
-            .error_statuses = {404}});
-  rows.add(Method::get, "/v1/proposals", "listFleetProposals", Role::read,
-           "Model proposals for the robots of the fleet, newest first", "proposal-list",
-           [](const Services& services, const Request& request) {
-             return proposals_of(services, request, std::nullopt);
-           },
-           {.parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
-            .csv = true});
+  rows.add(
+      Method::get, "/v1/robots/{id}/proposals", "listProposals", Role::read,
+      "Model proposals for a robot, newest first", "proposal-list", proposals,
+      {.parameters = {limit_parameter("proposals a page", 50, history::max_page_size), cursor_parameter()},
+       .csv = true,
+       .error_statuses = {404}});
+  rows.add(
+      Method::get, "/v1/proposals", "listFleetProposals", Role::read,
+      "Model proposals for the robots of the fleet, newest first", "proposal-list",
+      [](const Services& services, const Request& request) {
+        return proposals_of(services, request, std::nullopt);
+      },
+      {.parameters = {limit_parameter("proposals a page", 50, history::max_page_size), cursor_parameter()},
+       .csv = true});
   const Schema robot =
       described::with_words(described::of_type("string", true), "null in the list of the fleet");
   return {std::move(rows),

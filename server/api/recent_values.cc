@@ -49,7 +49,7 @@ Result<Response> recent(const Services& services, const Request& request) {
   std::set<std::string> ids(chosen.begin(), chosen.end());
   if (ids.empty())
     for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  const auto [page, next] = page_of_ids(request, ids, max_recent_robots);
+  const auto [page, next] = page_of_ids(request, ids);
   const auto write = [&](JsonWriter& json, const std::string& id) {
     recent_table().write(json, {id, services.recent.of(id)});
   };
@@ -69,7 +69,7 @@ Part recent_value_part() {
            {.parameters = {{.name = "robot_id",
                             .description = "only this robot, or these, separated by commas; a robot that was "
                                            "not heard has empty columns"},
-                           limit_parameter("robots a page", max_recent_robots),
+                           limit_parameter("robots a page", max_recent_robots, max_recent_robots),
                            cursor_parameter()},
             .rounded = true});
   const Schema window = described::with_words(described::of_type("number"), "s, greatest age of the values");

@@ -40,7 +40,7 @@ Result<Response> list_robots(const Services& services, const Request& request) {
   std::set<std::string> ids;
   for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  const auto [page, next] = page_of_ids(request, ids, max_listed_robots);
+  const auto [page, next] = page_of_ids(request, ids);
   const auto write = [&](JsonWriter& json, const std::string& id) { write_robot_state(json, services, id); };
   if (request.csv)
     return csv_response(request, "robots",
@@ -275,8 +275,7 @@ Result<Response> versions(const Services& services, const Request& request) {
   TRY_ASSIGN(const std::vector<history::ModelVersion> found,
              services.store.model_versions(request.param("id")));
   TRY_ASSIGN(const auto cursor, id_cursor(request));
-  const auto limit =
-      static_cast<std::size_t>(request.query_integer("limit").value_or(history::max_page_size));
+  const auto limit = static_cast<std::size_t>(*request.query_integer("limit"));
   const auto is_next = [&](const history::ModelVersion& v) { return !cursor || v.version < *cursor; };
   const std::span page(std::ranges::find_if(found, is_next), found.end());
   const auto shown = page.first(std::min(limit, page.size()));
@@ -303,7 +302,8 @@ Part robot_part() {
   rows.add(Method::get, "/v1/robots", "listRobots", Role::read,
            "The fleet: every robot that has a model or has sent telemetry, by id, with its live state",
            "robot-list", list_robots,
-           {.parameters = {limit_parameter("robots a page", max_listed_robots), cursor_parameter()},
+           {.parameters = {limit_parameter("robots a page", max_listed_robots, max_listed_robots),
+                           cursor_parameter()},
             .csv = true,
             .rounded = true});
   rows.add(Method::get, "/v1/robots/{id}", "getRobot", Role::read, "A robot's model in force", "robot-detail",
@@ -330,7 +330,8 @@ Part robot_part() {
   rows.add(Method::get, "/v1/robots/{id}/models", "listModels", Role::read,
            "Every version of a robot's model, newest first", "model-list", versions,
            {.former_path = "/v1/robots/{id}/versions",
-            .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
+            .parameters = {limit_parameter("versions a page", history::max_page_size, history::max_page_size),
+                           cursor_parameter()},
             .etag = true,
             .error_statuses = {404}});
   rows.add(Method::get, "/v1/robots/{id}/models/{version}", "getModel", Role::read,

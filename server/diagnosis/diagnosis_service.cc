@@ -252,7 +252,7 @@ Result<void> DiagnosisService::any_ended(const DiagnosisRequest& request) const 
   using State = history::MissionState;
   history::MissionFilter ended;
   ended.robot_ids = {request.robot_id};
-  ended.start_from_utime_us = request.since_utime_us;
+  ended.started.from_utime_us = request.since_utime_us.value_or(history::whole_past);
   ended.states = {State::finished, State::aborted, State::unfinished, State::superseded, State::interrupted};
   TRY_ASSIGN(const auto page, parts_.store.missions(ended, {.limit = 1, .cursor = {}}));
   if (!page.missions.empty()) return {};

@@ -88,7 +88,7 @@ Result<StoredRecordings> read_recordings(const history::Store& store, const Reco
 
   history::MissionFilter filter;
   filter.robot_ids = {wanted.robot_id};
-  filter.start_from_utime_us = wanted.since_utime_us;
+  filter.started.from_utime_us = wanted.since_utime_us.value_or(history::whole_past);
   history::PageRequest page;
   do {
     TRY_ASSIGN(history::MissionPage found, store.missions(filter, page));

@@ -46,6 +46,7 @@ struct Request {
   bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
+  bool all_rows = false;                       // of this CSV: it came without ?limit=
   bool deprecated = false;                     // came to an endpoint's former path
   std::string id;                              // the client's X-Request-Id if valid, else generated
   mutable Kept kept = {};                      // filled by the handler's wrapper
@@ -104,6 +105,7 @@ struct Response {
   std::vector<std::pair<std::string, std::string>> headers;
   std::shared_ptr<StreamSource> stream;  // sent instead of a body when set
   bool deprecated = false;               // its request has members of the version before
+  std::string next_cursor;               // of a CSV that is a page: the next one's; empty: none
 
   std::string_view header(std::string_view name) const;  // as Request's
 };

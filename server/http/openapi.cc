@@ -88,6 +88,7 @@ ordered_json parameter_of(const Parameter& parameter) {
   };
   if (parameter.minimum) schema["minimum"] = bound(*parameter.minimum);
   if (parameter.maximum) schema["maximum"] = bound(*parameter.maximum);
+  if (parameter.usual) schema["default"] = bound(*parameter.usual);
   if (!parameter.choices.empty()) schema["enum"] = parameter.choices;
   return {{"name", parameter.name},
           {"in", "query"},
@@ -292,7 +293,13 @@ class Document {
     }
     success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
         std::move(content);
-    if (endpoint.csv) success["content"]["text/csv"] = {{"schema", {{"type", "string"}}}};
+    if (endpoint.csv)
+      success["content"]["text/csv"] = {
+          {"schema",
+           {{"type", "string"},
+            {"description",
+             "a table; where it is a list, of all items unless the request has limit, with which the header "
+             "Link contains the next page (rel=\"next\")"}}}};
     return success;
   }
 

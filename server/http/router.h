@@ -34,7 +34,8 @@ struct Parameter {
   std::optional<double> minimum = std::nullopt;
   std::optional<double> maximum = std::nullopt;
   bool required = false;
-  std::vector<std::string> choices = {};  // for text: the only values allowed, when not empty
+  std::vector<std::string> choices = {};       // for text: the only values allowed, when not empty
+  std::optional<double> usual = std::nullopt;  // what a request without it has
 };
 
 // One kind of event of an event stream, for documents.

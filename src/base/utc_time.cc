@@ -41,4 +41,10 @@ std::optional<std::int64_t> parse_utc(std::string_view text) {
   return (local + microseconds(std::stoi(decimals)) - (part[8] == "-" ? -offset : offset)).count();
 }
 
+std::optional<std::int64_t> parse_utc_end(std::string_view text) {
+  const bool has_time = text.find('T') != std::string_view::npos;
+  const auto parsed = parse_utc(text);
+  return parsed && !has_time ? *parsed + microseconds(days(1)).count() : parsed;
+}
+
 }  // namespace joulecast

@@ -66,8 +66,9 @@ void Where::visit(Visit visit) const {
   if (f.robot_ids.size() > 1) visit(among("robot_id", f.robot_ids.size()), f.robot_ids);
   if (f.mission_id) visit("mission_id = ?", *f.mission_id);
   if (f.name_contains) visit("lower(mission_id) LIKE ? ESCAPE '!'", pattern_);
-  if (f.start_from_utime_us) visit("start_utime_us >= ?", *f.start_from_utime_us);
-  if (f.start_to_utime_us) visit("start_utime_us < ?", *f.start_to_utime_us);
+  const auto [from, to] = f.started;
+  if (from != whole_past) visit("start_utime_us >= ?", from);
+  if (to != whole_future) visit("start_utime_us < ?", to);
   if (!states_.empty()) visit(among("state", states_.size()), states_);
   if (f.incomplete) visit("incomplete = ?", std::int64_t{*f.incomplete});
   if (f.payload_min_kg) visit("payload_kg >= ?", *f.payload_min_kg);
@@ -123,7 +124,7 @@ Result<void> check_filter(const MissionFilter& f) {
   if (f.robot_ids.size() > max_filter_robots)
     return invalid("robot_id", "must name at most " + std::to_string(max_filter_robots) + " robots");
   if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
-  TRY(check_range({f.start_from_utime_us.value_or(whole_past), f.start_to_utime_us.value_or(whole_future)}));
+  TRY(check_range(f.started));
   TRY(check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg));
   return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
 }

@@ -128,8 +128,7 @@ class Summed {
   // last day if the time range begins or ends within them, and open missions.
   void add_parts() {
     const std::int64_t day_before_end = whole_future - day_us, day_after_begin = whole_past + day_us;
-    const std::int64_t from = filter_.start_from_utime_us.value_or(whole_past);
-    const std::int64_t to = filter_.start_to_utime_us.value_or(whole_future);
+    const auto [from, to] = filter_.started;
     const std::int64_t first = from <= day_after_begin  ? whole_past
                                : from >= day_before_end ? whole_future
                                                         : day_of(from + day_us - 1);

@@ -17,13 +17,21 @@
 
 namespace joulecast::history {
 
+inline constexpr std::int64_t whole_past = std::numeric_limits<std::int64_t>::min();
+inline constexpr std::int64_t whole_future = std::numeric_limits<std::int64_t>::max();
+
+// Half-open: from <= utime < to.
+struct TimeRange {
+  std::int64_t from_utime_us = whole_past;
+  std::int64_t to_utime_us = whole_future;
+};
+
 // Which missions; an absent member does not filter. Bounds are half-open: from <= value < to.
 struct MissionFilter {
   std::vector<std::string> robot_ids;  // empty: any
   std::optional<std::string> mission_id;
   std::optional<std::string> name_contains;  // a part of mission_id; ASCII letters in any case
-  std::optional<std::int64_t> start_from_utime_us;
-  std::optional<std::int64_t> start_to_utime_us;
+  TimeRange started;
   std::vector<MissionState> states;  // empty: any
   std::optional<bool> incomplete;
   // Closed: min <= payload <= max. Either one excludes missions of undeclared payload.
@@ -95,15 +103,6 @@ struct TotalsGroup {
   std::string robot_id;            // by robot
   std::int64_t from_utime_us = 0;  // by day or week: its beginning
   Totals totals;
-};
-
-inline constexpr std::int64_t whole_past = std::numeric_limits<std::int64_t>::min();
-inline constexpr std::int64_t whole_future = std::numeric_limits<std::int64_t>::max();
-
-// Half-open: from <= utime < to.
-struct TimeRange {
-  std::int64_t from_utime_us = whole_past;
-  std::int64_t to_utime_us = whole_future;
 };
 
 // Entries of the log of events or of the audit; of the latter, `kinds` are actions. Empty: all.

@@ -20,6 +20,12 @@ TEST(UtcTime, ReadsItsForms) {
   EXPECT_EQ(parse_utc("1969-12-31T23:59:59Z"), -1'000'000);
 }
 
+TEST(UtcTime, EndOfDateIncludesDay) {
+  EXPECT_EQ(parse_utc_end("2026-11-22"), parse_utc("2026-11-23"));
+  EXPECT_EQ(parse_utc_end("2026-11-22T16:45Z"), at);
+  EXPECT_EQ(parse_utc_end("yesterday"), std::nullopt);
+}
+
 TEST(UtcTime, RejectsOtherForms) {
   for (const char* text :
        {"", "2026", "2026-11", "2026-13-01", "2026-02-30", "2026-11-22T", "2026-11-22T16:45",

@@ -492,7 +492,7 @@ void ask(const std::string& url) {
   const std::int64_t today = host_now_us() / day_us * day_us;
   MissionFilter robot, month, robot_month;
   robot.robot_ids = {robot_name(17)};
-  month.start_from_utime_us = today - 30 * day_us;
+  month.started.from_utime_us = today - 30 * day_us;
   robot_month = month;
   robot_month.robot_ids = robot.robot_ids;
   std::printf("%lld missions\n", static_cast<long long>(need(store->size()).missions));
@@ -504,7 +504,7 @@ void ask(const std::string& url) {
   time("list of one robot", 10, [&](int) { need(store->missions(robot, {50, {}}, {})); });
   time("list of a day of one robot, oldest first", 10, [&](int k) {
     MissionFilter day = robot;
-    day.start_from_utime_us = today - (k + 1) * day_us;
+    day.started.from_utime_us = today - (k + 1) * day_us;
     need(store->missions(day, {50, {}}, {MissionOrder::start, true}));
   });
   time("totals of one robot by day, all time", 50,

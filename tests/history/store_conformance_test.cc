@@ -535,8 +535,8 @@ TEST_P(StoreConformance, FiltersMissions) {
 
   f = {};
   f.robot_ids = {"amr-1"};
-  f.start_from_utime_us = missions[2].start_utime_us;
-  f.start_to_utime_us = missions[5].start_utime_us;
+  f.started.from_utime_us = missions[2].start_utime_us;
+  f.started.to_utime_us = missions[5].start_utime_us;
   EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[4].key, missions[3].key, missions[2].key));
 
   f = {};
@@ -709,8 +709,8 @@ TEST_P(StoreConformance, RefusesBadQueries) {
   const std::string cursor = need(store_->missions(f, {1, {}})).next_cursor;
   f.robot_ids = {"amr-1"};
   refuses(f, {1, cursor}, "cursor");
-  f.start_from_utime_us = 2;
-  f.start_to_utime_us = 1;
+  f.started.from_utime_us = 2;
+  f.started.to_utime_us = 1;
   refuses(f, {1, {}}, "from_utime_us");
   f = {};
   f.payload_min_kg = signals::unmeasured;
@@ -980,7 +980,7 @@ TEST_P(StoreConformance, SumsTracesByFloorSquare) {
   of_one.robot_ids = {"amr-2"};
   EXPECT_EQ(floor_of(*store_, of_one, 2).missions, std::vector{second.key});
   MissionFilter later;
-  later.start_from_utime_us = 150'000'000;
+  later.started.from_utime_us = 150'000'000;
   EXPECT_EQ(floor_of(*store_, later, 2).missions, std::vector{second.key});
 }
 
@@ -1654,8 +1654,8 @@ TEST_P(StoreConformance, DaySumsFollowEveryChange) {
     EXPECT_EQ(grouped, missions);
     // Of half a day: parts of days are summed up from missions.
     MissionFilter half;
-    half.start_from_utime_us = now_utime_us_ - second_us;
-    half.start_to_utime_us = now_utime_us_ + second_us;
+    half.started.from_utime_us = now_utime_us_ - second_us;
+    half.started.to_utime_us = now_utime_us_ + second_us;
     EXPECT_EQ(need(store_->totals(half)).missions, std::min<std::int64_t>(missions, 1));
   };
   Mission m = start_mission(*store_, "amr-1", "m", now_utime_us_);

@@ -49,6 +49,18 @@ std::vector<Endpoint> table() {
       {.name = "order", .choices = {"newest", "oldest"}},
       {.name = "live", .type = Parameter::Type::boolean},
       {.name = "width_s", .type = Parameter::Type::number, .minimum = 0.1}};
+  rows.push_back(row(Method::get, "/v1/table", [](const Request& request) -> Result<Response> {
+    const auto first = std::stoi(std::string(request.query_value("cursor").value_or("0")));
+    Response page;
+    page.body =
+        "n\n" + std::to_string(first) + " of " + std::to_string(*request.query_integer("limit")) + "\n";
+    if (first < 2) page.next_cursor = std::to_string(first + 1);
+    return page;
+  }));
+  rows.back().csv = true;
+  rows.back().parameters = {
+      {.name = "limit", .type = Parameter::Type::integer, .minimum = 1, .maximum = 9, .usual = 3},
+      {.name = "cursor"}};
   rows.push_back(row(Method::get, "/v1/needs", says("has")));
   rows.back().parameters = {{.name = "from", .required = true}};
   return rows;
@@ -135,6 +147,20 @@ TEST_F(RouterTest, ChecksQueryKeysAndValues) {
   fault("/v1/missions?live=yes", 422, "live");
   fault("/v1/missions?order=random", 422, "order");
   fault("/v1/needs", 422, "from");
+}
+
+TEST_F(RouterTest, TableWithoutLimitIsWhole) {
+  const Response page = ask(Method::get, "/v1/table?limit=4", {{"Accept", "text/csv"}});
+  EXPECT_EQ(page.body, "n\n0 of 4\n");
+  EXPECT_EQ(header(page, "Link"), "</v1/table?limit=4&cursor=1>; rel=\"next\"");
+  const Response whole = ask(Method::get, "/v1/table", {{"Accept", "text/csv"}});
+  EXPECT_EQ(header(whole, "Link"), "");
+  ASSERT_TRUE(whole.stream);
+  std::string text;
+  while (whole.stream->pull(text) == StreamSource::Next::more) {
+  }
+  EXPECT_EQ(text, "n\n0 of 9\n1 of 9\n2 of 9\n");
+  EXPECT_EQ(ask(Method::get, "/v1/table").body, "n\n0 of 3\n");
 }
 
 TEST_F(RouterTest, ChecksTypesOfBodiesAndAnswers) {
