@@ -61,21 +61,15 @@ bool beyond(const Estimate& e, double low, double high) {
 }  // namespace
 
 void check_limits(const CheckContext& c, Checks& checks) {
-  using enum Property;
-  struct Limited {
-    Property of;
-    const char *id, *channel, *guess;
-  };
-  static constexpr Limited limited[] = {
-      {top_speed, "speed_over_limit", "wheel_velocity", "in rpm, or of the motor"},
-      {top_turn, "yaw_rate_over_limit", "yaw_rate", "in degrees"},
-      {top_payload, "payload_over_limit", "payload_mass", "in lb"}};
-  for (const ChannelEvidence& e : evidence_of(c))
-    for (const auto& [of, id, channel, guess] : limited)
-      if (e.property == of && e.ratio.value >= over_limit)
-        add_check(checks, id, channel, {e.ratio.value}, false,
-                  "{}: {} {:.3g} times the file's {}: is it {}? joulecast expects {}.", channel, e.says,
-                  e.ratio.value, e.against, guess, contract_of(channel));
+  for (const ChannelEvidence& e : evidence_of(c)) {
+    const bool turn = e.property == Property::top_turn;
+    if ((!turn && e.property != Property::top_speed) || e.ratio.value < over_limit) continue;
+    const std::string channel = turn ? "yaw_rate" : "wheel_velocity";
+    add_check(checks, turn ? "yaw_rate_over_limit" : "speed_over_limit", channel, {e.ratio.value}, false,
+              "{}: {} {:.3g} times the file's {}: is it {}? joulecast expects {}.", channel, e.says,
+              e.ratio.value, e.against, turn ? "in degrees" : "in rpm, or of the motor",
+              contract_of(channel));
+  }
 }
 
 void check_motors(const CheckContext& c, Checks& checks) {

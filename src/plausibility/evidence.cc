@@ -311,8 +311,8 @@ class Gatherer {
     most({yaw_rate}, "the fastest turn of a mission is usually", "limits.yaw_rate_rad_s",
          c_.usual(&Observation::fastest_turn_rad_s), limits.yaw_rate_rad_s, 6, limit_off, P::top_turn);
     if (const ValueTally& load = c_.tally(payload); load.known() > 0)
-      most({payload}, "the heaviest payload declared is", "limits.payload_kg", load.high(),
-           std::max(limits.payload_kg, 1.0), 10, limit_off, P::top_payload);
+      most({payload}, "the heaviest payload declared is", "the file's payload limit", load.high(),
+           std::max(limits.payload_kg, 1.0), 10);
     for (std::size_t k : {0u, 1u}) {
       const std::string motor = std::string("the ") + side_name[k] + " motor's ";
       const ValueTally &volts = c_.tally(motor_voltage + k), &amps = c_.tally(motor_current + k);

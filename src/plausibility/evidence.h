@@ -21,7 +21,6 @@ enum class Property : std::size_t {
   following,  // of commands
   top_speed,
   top_turn,
-  top_payload,
   steady_power,
   accelerating_power,
   inertia,

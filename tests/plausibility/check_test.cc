@@ -210,16 +210,6 @@ TEST(CheckRecordings, ReportsUnexplainedSpeedOverLimit) {
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
 }
 
-TEST(CheckRecordings, ReportsPayloadOverLimit) {
-  telemetry::RecordingSet set = scout().recordings;
-  EXPECT_FALSE(find(check_recordings(set, scout().model), "payload_over_limit"));
-  for (auto& mission : set.missions) mission.payload_kg = 8 * scout().model.limits.payload_kg;
-  alter::multiply(set, {reading::payload}, std::numeric_limits<double>::quiet_NaN());
-  const auto checks = check_recordings(set, scout().model);
-  ASSERT_TRUE(find(checks, "payload_over_limit"));
-  EXPECT_NEAR(find(checks, "payload_over_limit")->value, 8, 1e-6);
-}
-
 TEST(CheckRecordings, MeasuresHeldReadings) {
   for (const double step_a : {0.0, 0.02}) {
     telemetry::RecordingSet set = scout().recordings;
