@@ -113,7 +113,7 @@ std::optional<Check> overload(const RunRows& rows, double limit_kg) {
   if (!(run.at.payload_kg > limit_kg)) return std::nullopt;
   return Check{"payload_over_limit",
                "payload_kg",
-               run.at.payload_kg / limit_kg,
+               run.at.payload_kg / std::max(limit_kg, 1.0),
                {windows::missing, windows::missing},
                fmt::format("payload_kg of run {} is {}, the file's limits.payload_kg {}: is it in kg?",
                            run.name, brief(run.at.payload_kg), brief(limit_kg))};
