@@ -6,8 +6,9 @@
 
 namespace joulecast::client {
 
-// During its lifetime ctrl-C and SIGTERM end waits instead of the program. The signals are blocked, also in
-// threads started then, and polled. Construct it before opening LCM.
+// During its lifetime ctrl-C and SIGTERM end waits instead of the program. The signals are blocked and
+// polled, so that no code runs in a handler; threads started during that time inherit the block. Construct it
+// before opening LCM.
 class InterruptGuard : boost::noncopyable {
  public:
   InterruptGuard();

@@ -105,8 +105,10 @@ void print_calibration(const battery::Calibration& calibration, const battery::C
     fmt::print("to surroundings     {:.2f} K/W, {:.0f} s\n", *battery.thermal_resistance_k_w,
                *battery.thermal_time_constant_s);
   for (const battery::AtBound& at : calibration.at_bounds)
-    fmt::print("{} is at the fit's bound, {:.4g}: these recordings do not determine it\n", at.field,
-               at.bound);
+    fmt::print(
+        "{} = {:.4g} is at the bound of its search: the true value may lie beyond it, or the recordings do not "
+        "determine it\n",
+        at.field, at.bound);
   for (const battery::RecordingFit& fit : calibration.recordings)
     fmt::print("{:<32} voltage rms {:5.1f} mV{}\n", fit.name, 1e3 * fit.voltage_rms_v,
                fit.open_circuit ? ", gives the open-circuit voltage" : "");

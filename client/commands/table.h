@@ -20,7 +20,8 @@ namespace joulecast::client {
 FOR_EACH_COMMAND(DECLARE_COMMAND)
 #undef DECLARE_COMMAND
 
-// Adds the subcommands to the program; parsing runs the chosen one and leaves its outcome in `exit`.
+// Adds the subcommands to the program; when one is chosen, parsing runs it and leaves its outcome in `exit`,
+// which must outlive the parse.
 inline void add_commands(CLI::App& program, Exit& exit) {
 #define ADD_COMMAND(name) add_##name(program, exit);
   FOR_EACH_COMMAND(ADD_COMMAND)

@@ -89,7 +89,8 @@ T moved(const T& from, const T& rate, double by) {
 
 // The body, wheels and motors of a differential-drive robot, driven by the two armature voltages.
 // Equations of motion from the kinetic energy of body and wheels without lateral slip, with the centre of
-// mass off the axle, wheels of unequal radius and armature inductance; Runge-Kutta of order four.
+// mass off the axle, wheels of unequal radius and armature inductance; Runge-Kutta of order four at a fixed
+// step.
 class Plant {
  public:
   Plant(const RobotParameters& robot, const Imperfections& imperfections, const World& world);

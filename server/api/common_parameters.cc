@@ -40,7 +40,9 @@ Parameter limit_parameter(const std::string& things, std::int64_t usual, std::in
 }
 
 Parameter cursor_parameter() {
-  return {.name = "cursor", .description = "the next_cursor of the page before"};
+  return {
+      .name = "cursor",
+      .description = "the next_cursor of the page before; as CSV, the header Link contains the next page"};
 }
 
 Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {

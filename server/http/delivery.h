@@ -15,7 +15,8 @@ namespace joulecast::http {
 
 // Completes every answer of an endpoint: numbers rounded according to ?digits=, an ETag, the answer 304 to a
 // client with a current copy, and the content coding that the client accepts, for bodies above a kilobyte and
-// for streams except event streams. `on_io`: on the I/O thread no body is coded, which may take long.
+// for streams except event streams. `on_io`: on the I/O thread no body is coded, since a long one would delay
+// all others.
 void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io);
 
 // Pages of other origins that browsers let use the service (Fetch standard, CORS). They authenticate by a
@@ -55,7 +56,8 @@ enum class Coding : std::uint8_t { identity, gzip, zstd };
 
 std::string_view name(Coding coding);
 
-// The coding to answer with: zstd before gzip, which is slower and larger; of weights only q=0 is looked at.
+// The coding to answer with: zstd before gzip, since it takes less time for fewer bytes; weights other than
+// q=0 are not looked at.
 Coding coding_of(std::string_view accept_encoding);
 
 // The coded form; empty when the library fails, which it does for want of memory alone.

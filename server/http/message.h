@@ -46,7 +46,6 @@ struct Request {
   bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
-  bool all_rows = false;                       // of this CSV: it came without ?limit=
   bool deprecated = false;                     // came to an endpoint's former path
   std::string id;                              // the client's X-Request-Id if valid, else generated
   mutable Kept kept = {};                      // filled by the handler's wrapper

@@ -293,13 +293,7 @@ class Document {
     }
     success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
         std::move(content);
-    if (endpoint.csv)
-      success["content"]["text/csv"] = {
-          {"schema",
-           {{"type", "string"},
-            {"description",
-             "a table; where it is a list, of all items unless the request has limit, with which the header "
-             "Link contains the next page (rel=\"next\")"}}}};
+    if (endpoint.csv) success["content"]["text/csv"] = {{"schema", {{"type", "string"}}}};
     return success;
   }
 

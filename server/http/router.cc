@@ -113,27 +113,8 @@ std::string field_of(const Endpoint& endpoint, const Request& request, const Err
   return field;
 }
 
-// Of a CSV that is a page: the rows of all further pages if the request has no ?limit=, produced while they
-// are sent; otherwise the header Link of the next page (RFC 8288).
-void add_next_page(const Endpoint& endpoint, const Request& request, Response& page) {
-  if (request.all_rows) {
-    Request next = request;
-    next.target = {};
-    next.headers.clear();
-    page.stream = generate([&endpoint, next, rows = std::move(page.body), cursor = page.next_cursor](
-                               std::string& out, const std::stop_token& left) mutable {
-      out += rows;
-      if (cursor.empty()) return false;
-      std::erase_if(next.query, [](const auto& each) { return each.first == "cursor"; });
-      next.query.emplace_back("cursor", cursor);
-      next.stop = left;
-      Response more = endpoint.handler(next).value();
-      rows = more.body.substr(more.body.find('\n') + 1);
-      cursor = more.next_cursor;
-      return true;
-    });
-    return;
-  }
+// The next page of a list as CSV (RFC 8288).
+void add_link(const Request& request, Response& page) {
   std::string link = "<" + std::string(request.target.substr(0, request.target.find('?'))) + "?";
   for (const auto& [key, value] : request.query)
     if (key != "cursor") link += percent_encoded(key) + "=" + percent_encoded(value) + "&";
@@ -280,15 +261,12 @@ Router::Match Router::match(Request& request) const {
     if (const auto broken = broken_constraint(*parameter, value))
       return refused(422, "invalid", key + ": " + *broken, key, *broken);
   }
-  request.all_rows = request.csv && !request.query_value("limit");
   for (const auto& parameter : endpoint.parameters) {
     if (request.query_value(parameter.name)) continue;
     if (parameter.required)
       return refused(422, "invalid", parameter.name + ": this query key is required", parameter.name,
                      "is required");
-    const bool largest = request.all_rows && parameter.name == "limit";
-    if (const auto value = largest ? parameter.maximum : parameter.usual)
-      request.query.emplace_back(parameter.name, fmt::format("{}", *value));
+    if (parameter.usual) request.query.emplace_back(parameter.name, fmt::format("{}", *parameter.usual));
   }
   return {&endpoint, std::nullopt};
 }
@@ -304,7 +282,7 @@ Response Router::run(const Endpoint& endpoint, Request& request) const {
     }
     auto response = endpoint.handler(request);
     if (!response) return fault(endpoint, request, response.error());
-    if (!response->next_cursor.empty()) add_next_page(endpoint, request, *response);
+    if (!response->next_cursor.empty()) add_link(request, *response);
     deliver(endpoint, request, *response, endpoint.run == Run::io);
     return std::move(*response);
   } catch (const std::exception& cause) {

@@ -192,7 +192,8 @@ void Session::begin_request() {
   if (!cut_) state_ = State::idle;
 }
 
-// Parses the received bytes, one request at a time: answers keep their order. False if it is refused.
+// Parses the received bytes, one request at a time, so that answers are sent in the order of the requests.
+// False if the request is refused.
 bool Session::parse() {
   const ServerOptions& limits = core_->options;
   while (buffer_.size() > 0 && !parser_->is_done()) {

@@ -14,7 +14,8 @@
 namespace joulecast::answers {
 namespace {
 
-// A given motion as columns: power at its points, energy by Gauss's rule over each span; its `peaks`.
+// A given motion as columns: power at its points and in between, energy by Gauss's rule over each span. Its
+// peaks are stored in `peaks`.
 planning::Profile series_of(const dynamics::DriveModel& drive, const GivenMotion& motion,
                             planning::Peaks& peaks) {
   const auto& [points, payload_kg, start] = motion;

@@ -10,7 +10,8 @@ namespace {
 
 constexpr double level = 0.05;
 
-// The median over the mission's squares of measured over modelled energy, weighted by it; NaN without both.
+// The median over the mission's squares of measured over modelled energy, weighted by the latter; NaN where
+// no square has both.
 double usual_ratio(std::span<const history::FloorVisit> visits) {
   std::vector<std::pair<double, double>> ratios;  // with their weights
   double total = 0;

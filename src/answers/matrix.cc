@@ -405,7 +405,8 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
   return cells;
 }
 
-// The probability that a robot ends each task with its reserve by minimum energy, and the charge for it.
+// The probability that a robot driving by minimum-energy profiles ends each task with its reserve, and the
+// charge with which it does.
 void Matrix::State::state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const {
   const auto possible = std::ranges::find_if(cells, [](const Cell& c) { return c.duration_s > 0; });
   const double standing_w = robot.model->drive.battery_power_for({0, 0});

@@ -13,7 +13,8 @@
 
 namespace joulecast::answers {
 
-// A plan with less than this relative excess over the shortest time is fastest: ten times the tolerance.
+// A plan with less than this relative excess over the shortest time counts as fastest: ten times the
+// planner's tolerance of deadlines.
 inline constexpr double at_the_limit = 1e-3;
 
 struct ProfileInput {
@@ -36,7 +37,8 @@ struct ProfileOutput {
   std::vector<planning::PlanCost> pareto;
 };
 
-// The minimum-energy motion along the path, against a trapezoid and a triangle. Fault::stopped on a stop.
+// The minimum-energy motion along the path within the limits, against a trapezoid and a triangle. A stop ends
+// planning with Fault::stopped.
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
                               const std::stop_token& stop = {});
 

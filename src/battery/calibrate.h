@@ -32,7 +32,7 @@ struct PassedOver {
   std::string reason;
 };
 
-// A fitted value at its bound: the recordings do not determine it.
+// A fitted value at the bound of its search.
 struct AtBound {
   std::string field;  // of the battery, as "/charge_lags/1/lag_s"
   double bound = 0;

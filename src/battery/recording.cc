@@ -124,7 +124,7 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
   for (;;) {
     const auto row = table.next(cells);
     // A logger that was cut off leaves a last line without its end.
-    if (row ? !*row : table.place().text.find('\n') == std::string_view::npos) break;
+    if (row ? !*row : table.place().text.find_first_of("\r\n") == std::string_view::npos) break;
     if (!row) return tl::unexpected(row.error());
     double value[columns] = {};
     for (std::size_t c = 0; c < cycle_column; ++c) {

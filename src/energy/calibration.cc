@@ -28,7 +28,8 @@ constexpr double least_significance = 2;  // standard errors from zero; other es
 // With fewer blocks than these Student's t is wide and itself uncertain.
 constexpr std::size_t enough_missions = 5, wanted_blocks = 8, least_blocks = 4;
 
-// Of the equations: the torque equation's columns, the torque that the file explains, current and voltage.
+// What the equations are made of: the torque equation's columns, the torque that the file explains, current
+// and voltage.
 enum Column : Eigen::Index {
   friction_right,
   friction_left,
@@ -55,7 +56,8 @@ class ReadingNoise {
       time_s_.push_back(1e-6 * static_cast<double>(s.utime_us - samples.front().utime_us));
     for (auto& side : differences_) side.assign(samples.size(), Eigen::Vector3d::Zero());
     for (std::size_t k = 0; k + 3 < samples.size(); ++k) {
-      // The combination of four neighbours that is zero for every quadratic, with the noise of a reading.
+      // The combination of four neighbours that is zero for every quadratic, for noise as large as a
+      // reading's.
       Eigen::Vector4d weight;
       for (Eigen::Index j = 0; j < 4; ++j) {
         weight[j] = 1;
@@ -329,7 +331,8 @@ class Calibrator {
       (options_.constants_known || constant_held_ ? resistance_held_ : constant_held_) = true;
       return true;
     }
-    // Friction cannot drive: a negative estimate becomes zero. An inertia with little evidence is the file's.
+    // Friction cannot drive: a negative estimate is set to zero. An inertia that the motion shows poorly is
+    // better taken from the robot file.
     Eigen::Index weakest = -1;
     double least = std::numeric_limits<double>::infinity();
     for (Eigen::Index k = 0; k < torque_count; ++k) {

@@ -17,7 +17,8 @@ class InitialValueProblem {
   virtual void rate(double t, std::span<const double> state, std::span<double> rate) = 0;
   // Error weights 1/tolerance of each state; called at every step.
   virtual void weights(std::span<const double> state, std::span<double> weight) const = 0;
-  // Cvode::advance() stops where one of these functions changes sign. Their number is fixed.
+  // Cvode::advance() stops where one of these functions changes sign. Their number is fixed at
+  // construction.
   virtual std::size_t event_count() const { return 0; }
   virtual void events(double /*t*/, std::span<const double> /*state*/, std::span<double> /*value*/) const {}
 };
@@ -29,7 +30,8 @@ struct Arrival {
 };
 
 // One CVODE integrator of fixed size by Adams and Moulton with fixed-point iteration, for smooth problems
-// that are not stiff, restarted as often as wanted. Owns its SUNContext: of one thread at a time.
+// that are not stiff, restarted as often as wanted. Owns its SUNContext, so an instance belongs to one thread
+// at a time.
 class Cvode {
  public:
   Cvode(std::size_t size, InitialValueProblem& problem);
@@ -44,7 +46,8 @@ class Cvode {
   // when it has left zero. The error carries CVODE's own message.
   Result<Arrival> advance(double t0, double t1);
 
-  // Bounds every step from now on, where error control could step over features; 0 lifts the bound.
+  // Bounds every step from now on, for right-hand sides with features that error control could step over;
+  // 0 lifts the bound.
   void limit_step(double longest);
 
  private:

@@ -10,7 +10,8 @@
 
 namespace joulecast::energy {
 
-// A motion to be priced: speeds and climb at times, linear in between: constant acceleration over each span.
+// A motion to be priced: speeds and climb at times, linear in between, so that acceleration is constant over
+// each span.
 struct MotionPoint {
   double time_s = 0;
   double speed_m_s = 0;

@@ -289,7 +289,8 @@ bool is_identified(const PowerParameters& parameters, const PowerFit& fit, Eigen
   return parameters.expected(p) > 0 && fit.deviation[p] < told_deviation;
 }
 
-// Every parameter with its value, standard error and meaning. Dropped effects only if shown to be absent.
+// Every parameter with its value, standard error and meaning. An effect that was dropped is listed where the
+// data show that it is absent.
 std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
                                                const PowerFree& free) {
   std::vector<ParameterEstimate> estimates;
@@ -312,7 +313,8 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
   return estimates;
 }
 
-// Parameters that these data do not identify, with the missing data, and those that battery power never does.
+// Parameters that these data do not identify, with the missing data, and those that no battery power
+// identifies.
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
   std::vector<Untold> untold;
   for (Eigen::Index p = 0; p < PowerParameter::count; ++p) {

@@ -122,7 +122,8 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
 
 PowerScale scale_of(std::span<const windows::Window> windows);
 
-// Mean reading of the battery's power meter over a window by a model [W]: begin, middle and end by speed.
+// Mean reading of the battery's power meter over a window by a model [W]: its begin, middle and end
+// each with their own speed.
 double metered_power_w(const dynamics::DriveModel& model, const windows::Window& window);
 
 // Power on windows::plain_terms(), by robust regression.
@@ -142,7 +143,7 @@ struct MissedPower {
   double file = 0;        // by the robot file
   double corrected = 0;   // by a model that was fitted to other windows
   double regression = 0;  // by a linear regression on those other windows
-  double lead_sd = 0;     // standard error of corrected - regression, from block to block
+  double lead_sd = 0;     // standard error of corrected - regression over blocks; NaN for one
 
   bool regression_wins() const { return corrected - regression > lead_sd; }
 };

@@ -62,7 +62,8 @@ std::array<double, refined_count> refined_values(const robot::RobotModel& robot)
 struct MissionFinding {
   std::size_t equations = 0;
   bool enough = false;  // for a finding
-  // Load beyond the declared payload; the deviation includes that of friction, slope, the mass and sensors.
+  // Load beyond the declared payload; the deviation includes the uncertainty from friction, slope, the
+  // robot's own mass and the sensors.
   Estimate undeclared_kg;
   bool undeclared = false;   // a significant deviation that is reported
   bool inseparable = false;  // payload cannot be separated from the rest: deviation above half the limit

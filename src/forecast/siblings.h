@@ -33,7 +33,7 @@ struct Siblings {
   std::vector<Scores::Entry> scores;
   std::int64_t robots = 0;
   std::optional<Habit> habit;      // equal parts of theirs
-  std::optional<Scatter> scatter;  // of harmonic means of their variances, as that assumed without any
+  std::optional<Scatter> scatter;  // root of the harmonic mean of their variances
 };
 
 // Hierarchical shrinkage: the kind's factors are the robots' means, weighted by 1 / (own variance + variance

@@ -59,7 +59,8 @@ class Pipeline {
   };
 
   Robot* find(const std::string& robot_id);
-  // Adds the robot's requests to its messages, in order of time; those that its latest mission has are noted.
+  // Adds the requests of the robot to its messages, in order of time; those with an effect that its latest
+  // mission has are only noted.
   static void merge(const StoredRobot& stored, Robot& robot, std::deque<InboundMessage>& messages);
   Robot& add(const StoredRobot& stored, const SessionOutputs& outputs);
   Result<StoredRobot> read(const std::string& robot_id) const;

@@ -6,7 +6,8 @@
 
 namespace joulecast::robot {
 
-// The same text for robots of one kind: the parameters of their design, which no calibration changes.
+// Robots with the same text are of one kind: the parameters of their design, which no calibration, refinement
+// or diagnosis changes.
 std::string kind_of(const RobotModel& robot);
 
 }  // namespace joulecast::robot

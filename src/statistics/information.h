@@ -5,7 +5,8 @@
 
 namespace joulecast::statistics {
 
-// Information of whitened equations y = X b + e, e ~ N(0, 1), on their coefficients.
+// Information of whitened equations y = X b + e, e ~ N(0, 1), on their coefficients: sufficient for Gaussian
+// inference.
 struct Information {
   Eigen::MatrixXd xx;    // X'X
   Eigen::VectorXd xy;    // X'y

@@ -8,7 +8,8 @@ namespace joulecast::statistics {
 // The middle value, of an even number the mean of the two in the middle; `values` must not be empty.
 double median(std::vector<double> values);
 
-// The value below which this fraction of the values lies, linear between neighbours; not of empty `values`.
+// The value below which this fraction of the values lies, linear between neighbours; `values` must not be
+// empty.
 double quantile(std::vector<double> values, double fraction);
 
 // A standard deviation of values about zero that a tenth of outliers does not change: from the mean size of

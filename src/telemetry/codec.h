@@ -63,7 +63,8 @@ struct SignedMessage {
 };
 
 [[nodiscard]] bool is_signed(std::span<const std::uint8_t> bytes);
-// Points into `bytes`. The decoders above decode the content of signed messages; is_authentic() checks them.
+// Points into `bytes`. The decoders above accept signed messages and decode their content; is_authentic()
+// checks the signature.
 [[nodiscard]] Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_signed(const SignedMessage& message);
 

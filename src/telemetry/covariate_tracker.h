@@ -25,7 +25,8 @@ class CovariateTracker {
   // A value older by more than `reorder_us` than the one that holds shows a clock set back, and is news.
   explicit CovariateTracker(std::int64_t reorder_us = 5'000'000) : reorder_us_(reorder_us) {}
 
-  // Takes one value of a message; `change` is set where it is news. None is earlier than the mission's start.
+  // Takes one value of a message; `change` is set where it is news. Within a mission no change is earlier
+  // than the mission's start.
   Verdict take(std::int64_t utime_us, const signals::Covariate& covariate, signals::CovariateChange& change);
 
   // A mission begins: returns the present values, as changes at its start. Removes names without a value.

@@ -18,7 +18,8 @@ namespace joulecast::telemetry {
 
 extern const std::string_view import_mapping_schema;  // its text
 
-// Finite readings between these are taken; others repeat the column's last good one where it holds, if any.
+// The finite readings between these are taken; any other repeats the column's last good one where it holds,
+// else it is none.
 struct ValueLimits {
   double low = std::numeric_limits<double>::lowest();
   double high = std::numeric_limits<double>::max();

@@ -63,7 +63,7 @@ struct SampleStep {
 struct MissionCounters {
   std::uint64_t opened_implicit = 0;
   std::uint64_t closed = 0;
-  std::uint64_t duplicate_events = 0;     // of a start or an end that was received already
+  std::uint64_t duplicate_events = 0;     // received already, or a late end of an ended mission
   std::uint64_t out_of_order_events = 0;  // older than the mission they would change
   std::uint64_t unknown_missions = 0;     // an end of a mission without a received start
   std::uint64_t samples_outside = 0;      // belong to no mission: before its start, or just after an end

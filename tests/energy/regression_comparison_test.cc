@@ -75,7 +75,7 @@ TEST(RegressionComparison, RegressionWinsOnRegressionPower) {
   EXPECT_TRUE(found->missed.regression_wins());
 }
 
-// Two models that err in turns: neither is ahead by more than chance, in either direction.
+// A lead within its standard error is a tie.
 TEST(RegressionComparison, EqualErrorsAreATie) {
   MissedPower tie{0.01, 0.0043, 0.0040, 0.0005};
   EXPECT_FALSE(tie.regression_wins());

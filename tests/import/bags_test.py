@@ -303,10 +303,19 @@ class Bags(unittest.TestCase):
         mapping = self.place / "mapping.json"
         mapping.write_text(json.dumps({"topics": {"wheels": "/amr_1/joint_states"}}))
         log, text = self.bring(self.mcap(both), "--mapping", mapping)
-        self.assertIn("topics below /amr_2/ are left out", text)
+        self.assertIn("topics below /amr_2/ belong to other robots", text)
         self.assertNotIn("packs in parallel", text)
         self.assert_same(log)
         self.assertNotIn("left out", self.bring(self.mcap(own))[1])
+
+    def test_other_odometry_is_no_robot(self):
+        drive = Drive(self.samples).battery().rest()
+        drive.list += [(at, "/camera/odom", kind, message) for at, topic, kind, message in drive.list if topic == "/odom"]
+        names = {"/odom": "/base/odom", "/imu/data": "/camera/imu"}
+        drive.list = [(at, names.get(topic, topic), kind, message) for at, topic, kind, message in drive.list]
+        log, text = self.bring(self.mcap(drive))
+        self.assertNotIn("other robots", text)
+        self.assertTrue(any(math.isfinite(sample["yaw_rate"]) for sample in samples_of(log)))
 
     def test_other_joints_are_passed_over(self):
         drive = Drive(self.samples).all().wheels(name=("shoulder", "elbow"))

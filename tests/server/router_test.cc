@@ -149,17 +149,11 @@ TEST_F(RouterTest, ChecksQueryKeysAndValues) {
   fault("/v1/needs", 422, "from");
 }
 
-TEST_F(RouterTest, TableWithoutLimitIsWhole) {
+TEST_F(RouterTest, LinksNextPage) {
   const Response page = ask(Method::get, "/v1/table?limit=4", {{"Accept", "text/csv"}});
   EXPECT_EQ(page.body, "n\n0 of 4\n");
   EXPECT_EQ(header(page, "Link"), "</v1/table?limit=4&cursor=1>; rel=\"next\"");
-  const Response whole = ask(Method::get, "/v1/table", {{"Accept", "text/csv"}});
-  EXPECT_EQ(header(whole, "Link"), "");
-  ASSERT_TRUE(whole.stream);
-  std::string text;
-  while (whole.stream->pull(text) == StreamSource::Next::more) {
-  }
-  EXPECT_EQ(text, "n\n0 of 9\n1 of 9\n2 of 9\n");
+  EXPECT_EQ(header(ask(Method::get, "/v1/table?limit=4&cursor=2", {{"Accept", "text/csv"}}), "Link"), "");
   EXPECT_EQ(ask(Method::get, "/v1/table").body, "n\n0 of 3\n");
 }
 

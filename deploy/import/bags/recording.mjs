@@ -188,19 +188,28 @@ export class Recording {
     return this.foreign?.some((space) => `/${name}`.replace('//', '/').startsWith(space));
   }
 
-  // Namespaces with a topic like that of the wheels, such as /amr_2/ if the wheels are /amr_1/joint_states.
+  // Namespaces beside that of the wheels with the same topics: one of joints of both sides, or of odometry and
+  // another, such as /amr_2/ with odom and battery_state if the wheels are /amr_1/odom.
   foreignTo(wheels) {
     const own = wheels.name.split('/');
+    const others = (at, space) =>
+      [...this.topics.keys()].filter((name) => {
+        const parts = name.split('/');
+        const ours = [...parts.slice(0, at), own[at], ...parts.slice(at + 1)].join('/');
+        return parts[at] === space && ours !== wheels.name && this.topics.has(ours);
+      });
     return [...this.topics.values()].flatMap(({ name, kind, rows }) => {
       const parts = name.split('/');
       const [at, ...more] = [...own.keys()].filter((k) => own[k] !== parts[k]);
       if (kind !== wheels.kind || parts.length !== own.length || more.length || !(at < own.length - 1))
         return [];
-      const sides =
-        kind === 'nav_msgs/Odometry' || this.joints(new Set(rows.flatMap((row) => row.data.name)));
-      return sides === true || (sides.right.length && sides.left.length)
-        ? [`${parts.slice(0, at + 1).join('/')}/`]
-        : [];
+      const names = new Set();
+      for (const { data } of rows) for (const joint of data.name ?? []) names.add(joint);
+      const { right, left } = this.joints(names);
+      const alike = names.size
+        ? [right, left].every((side) => side.some((joint) => names.has(joint)))
+        : others(at, parts[at]).length;
+      return alike ? [`${parts.slice(0, at + 1).join('/')}/`] : [];
     });
   }
 
@@ -360,7 +369,7 @@ export class Recording {
     const wheels = this.wheels();
     if (this.foreign.length)
       this.warn(
-        `topics below ${list(this.foreign)} are left out, as of other robots; --mapping with {"topics": {"wheels": "..."}} imports them`,
+        `topics below ${list(this.foreign)} belong to other robots and are left out; --mapping with {"topics": {"wheels": "..."}} imports one of them`,
       );
     this.stamp(wheels.rows, wheels.topic.name);
     // Simulated time counts from zero; the times of receipt may have the date.

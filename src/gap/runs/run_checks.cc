@@ -110,13 +110,13 @@ RunChecks outliers(const RunRows& rows, const std::string& column) {
 std::optional<Check> overload(const RunRows& rows, double limit_kg) {
   const auto& run =
       *std::ranges::max_element(rows.runs(), {}, [](const MissionRun& r) { return r.at.payload_kg; });
-  if (!(run.at.payload_kg > limit_kg)) return std::nullopt;
+  if (!(limit_kg > 0 && run.at.payload_kg > limit_kg)) return std::nullopt;
   return Check{"payload_over_limit",
                "payload_kg",
-               run.at.payload_kg / std::max(limit_kg, 1.0),
+               run.at.payload_kg / limit_kg,
                {windows::missing, windows::missing},
-               fmt::format("payload_kg of run {} is {}, the file's limits.payload_kg {}: is it in kg?",
-                           run.name, brief(run.at.payload_kg), brief(limit_kg))};
+               fmt::format("payload_kg of run {} is {}, above the file's limits.payload_kg, {}.", run.name,
+                           brief(run.at.payload_kg), brief(limit_kg))};
 }
 
 }  // namespace

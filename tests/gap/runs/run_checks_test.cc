@@ -56,7 +56,6 @@ TEST(RunChecks, ReportsConstantEnergies) {
                       "constant_channel", "energy_j is ");
 }
 
-// One run in 40 is short with little energy, or has tenfold energy. It is named and does not bias the load.
 TEST(RunChecks, ReportsPayloadOverLimit) {
   const Diagnosis d = checked_runs([](RunSet& set) { set.runs[7].at.payload_kg = 5000; }).diagnosis;
   const auto over = std::ranges::find(d.checks, "payload_over_limit", &Check::id);
@@ -65,6 +64,7 @@ TEST(RunChecks, ReportsPayloadOverLimit) {
   EXPECT_FALSE(over->contradicted);
 }
 
+// One run in 40 is short with little energy, or has tenfold energy. It is named and does not bias the load.
 TEST(RunChecks, NamesOutlierRun) {
   for (const bool small : {true, false}) {
     const RunDiagnosis r = checked_runs([&](RunSet& set) {
