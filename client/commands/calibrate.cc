@@ -106,7 +106,8 @@ void print_calibration(const battery::Calibration& calibration, const battery::C
                *battery.thermal_time_constant_s);
   for (const battery::AtBound& at : calibration.at_bounds)
     fmt::print(
-        "{} = {:.4g} is at the bound of its search: the true value may lie beyond it, or the recordings do not "
+        "{} = {:.4g} is at the bound of its search: the true value may lie beyond it, or the recordings do "
+        "not "
         "determine it\n",
         at.field, at.bound);
   for (const battery::RecordingFit& fit : calibration.recordings)
