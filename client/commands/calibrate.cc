@@ -106,9 +106,8 @@ void print_calibration(const battery::Calibration& calibration, const battery::C
                *battery.thermal_time_constant_s);
   for (const battery::AtBound& at : calibration.at_bounds)
     fmt::print(
-        "{} = {:.4g} is at the bound of its search: the true value may lie beyond it, or the recordings do "
-        "not "
-        "determine it\n",
+        "{} = {:.4g} is at the bound of its search: the true value may lie beyond it, or the recordings "
+        "do not determine it\n",
         at.field, at.bound);
   for (const battery::RecordingFit& fit : calibration.recordings)
     fmt::print("{:<32} voltage rms {:5.1f} mV{}\n", fit.name, 1e3 * fit.voltage_rms_v,
