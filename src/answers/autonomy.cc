@@ -73,19 +73,17 @@ struct Pricing {
 Result<Pricing> as_usual(const AutonomyInput& input, const TaskPlan& plan, const forecast::LegPricer& pricer,
                          const forecast::Forecaster& forecaster) {
   std::optional<Error> stuck;
-  const auto price = [&](const std::vector<PlannedLeg>& legs, const StatedPace& pace, bool halts_stated) {
-    auto priced = forecast::price(forecaster, pricer, legs, pace, halts_stated);
+  const auto price = [&](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
+    auto priced = forecast::price(forecaster, pricer, legs, pace, plan.halts_stated);
     if (!stuck) stuck = forecast::obstacle(pricer, legs, priced);
     return priced;
   };
   Pricing priced;
   priced.tasks.reserve(plan.tasks.size());
-  for (std::size_t k = 0; k < plan.tasks.size(); ++k) {
-    const TaskPlan::Task& task = plan.tasks[k];
-    priced.tasks.push_back({price(task.legs, input.tasks[k].pace, task.halts_stated),
-                            price(task.to_charger, input.pace, task.halts_stated)});
-  }
-  priced.from_here = price(plan.from_here, input.pace, false);
+  for (std::size_t k = 0; k < plan.tasks.size(); ++k)
+    priced.tasks.push_back(
+        {price(plan.tasks[k].legs, input.tasks[k].pace), price(plan.tasks[k].to_charger, input.pace)});
+  priced.from_here = price(plan.from_here, input.pace);
   if (stuck) return tl::unexpected(std::move(*stuck));
   return priced;
 }
@@ -232,10 +230,9 @@ const Input<AutonomyTask, AutonomyContext>& task_input() {
           .include(way_input(), &AutonomyTask::way)
           .include(former_way_input(), &AutonomyTask::way)
           .check(check_place)
-          .number(
-              "dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
-              "time at rest at the end of the task. If stated, 0 included, the forecast of the task and of "
-              "its way to the charger contains no other halts")
+          .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
+                  "time at rest at the end of the task. If any task states it, 0 included, the forecast "
+                  "contains no other halts")
           .number(
               "to_charger_m", &AutonomyTask::to_charger_m, charger_way_m,
               "distance from this task's end to the charger; required where the charger's position is not "
@@ -631,7 +628,8 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
     }
     TaskPlan::Task& into = plan.tasks.emplace_back();
     into.legs = std::move(*legs);
-    into.halts_stated = task.dwell_s || task.way.halts_stated() || forecast::states_halts(into.legs);
+    plan.halts_stated =
+        plan.halts_stated || task.dwell_s || task.way.halts_stated() || forecast::states_halts(into.legs);
     for (const PlannedLeg& leg : into.legs)
       into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
     into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);
@@ -675,9 +673,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   const bool minimum_energy = input.driving == Driving::minimum_energy;
   out.track = minimum_energy || paces_stated(input, plan) ? Track::stated : Track::usual;
   out.pace = forecaster.habit.with(input.pace).middle;
-  if ((!plan.tasks.empty() && std::ranges::all_of(plan.tasks, &TaskPlan::Task::halts_stated)) ||
-      minimum_energy)
-    out.pace.pause_s = 0;
+  if (plan.halts_stated || minimum_energy) out.pace.pause_s = 0;
 
   const forecast::LegPricer pricer(model.robot, model.drive);
   out.limitation = limitation_of(input, plan, pricer, robot, out);

@@ -56,10 +56,10 @@ struct TaskPlan {
     std::vector<forecast::PlannedLeg> legs;
     std::vector<forecast::PlannedLeg> to_charger;  // empty: no charger given
     double greatest_payload_kg = 0;
-    bool halts_stated = false;  // by the task, possibly as 0: no others are predicted, nor to the charger
   };
   std::vector<Task> tasks;
   std::vector<forecast::PlannedLeg> from_here;  // to the charger
+  bool halts_stated = false;  // a task states its dwell, possibly 0: no other halts are predicted
 };
 
 // Builds each task's path once. Errors name "/tasks/<index>/path/...".

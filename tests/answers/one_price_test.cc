@@ -196,23 +196,6 @@ TEST_P(OnePrice, OfUsualDriving) {
   expect_same(by_autonomy(task, "usual"), estimate, 1e-6, 1e-4);
 }
 
-// A later task may state its dwell, and an earlier one not.
-TEST_P(OnePrice, IgnoresLaterTasks) {
-  const json tasks = json::array({of_way(random_task(), json::object())});
-  for (const char* driving : {"usual", "minimum_energy"}) {
-    const auto first_leg = [&](const json& list) {
-      return parsed(autonomy_answer({{"state_of_charge", 0.9},
-                                     {"driving", driving},
-                                     {"charger", {{"x_m", 3}, {"y_m", 4}}},
-                                     {"tasks", list}},
-                                    robot_, {}, tables_))["plan"]["legs"][0];
-    };
-    json list = tasks;
-    list.push_back({{"distances_m", {5}}, {"turns_rad", {0}}, {"dwell_s", between(0, 9)}});
-    EXPECT_EQ(first_leg(list), first_leg(tasks)) << list.dump();
-  }
-}
-
 // The three forms with and without a dwell, curves among the paths.
 INSTANTIATE_TEST_SUITE_P(OfThirtyTasks, OnePrice, ::testing::Range(0, 30));
 
