@@ -818,7 +818,6 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     rebuild(uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
                                   : split(nodes_, lost, 0.8 * most, parts));
     SpeedSolution finer = solver_->solve(s.price_w, fine_tolerance, stop, due);
-    if (due && !finer.converged) finer = solver_->solve(s.price_w, fine_tolerance, stop);
     if (!finer.converged || (refined_ && !finer.stationary())) {
       if (!refined_) s.gap_j = s.cost_j;  // the error of a coarse grid is unknown
       rebuild(coarse_nodes);
