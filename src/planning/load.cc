@@ -44,7 +44,7 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
   e.up = 1 + p.driver_loss;
   e.down = 1 - p.unreturned - p.driver_loss;
   for (std::size_t s : {0u, 1u}) {
-    e.volts_per_nm[s] = p.resistance_ohm[s] / p.torque_constant_nm_a;
+    e.resistance_ohm[s] = p.resistance_ohm[s];
     e.copper_w_n2_m2[s] = p.resistance_ohm[s] / (p.torque_constant_nm_a * p.torque_constant_nm_a);
   }
   return loads;
