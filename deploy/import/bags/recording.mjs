@@ -216,6 +216,10 @@ export class Recording {
   wheels() {
     const found = this.findWheels();
     this.foreign = this.foreignTo(found.topic);
+    if (this.foreign.length)
+      this.warn(
+        `topics below ${list(this.foreign)} belong to other robots and are left out; --mapping with {"topics": {"wheels": "..."}} imports one of them`,
+      );
     return found;
   }
 
@@ -367,10 +371,6 @@ export class Recording {
   // {files: name to text, mapping} for a recording called `stem`.
   tables(stem, robotId) {
     const wheels = this.wheels();
-    if (this.foreign.length)
-      this.warn(
-        `topics below ${list(this.foreign)} belong to other robots and are left out; --mapping with {"topics": {"wheels": "..."}} imports one of them`,
-      );
     this.stamp(wheels.rows, wheels.topic.name);
     // Simulated time counts from zero; the times of receipt may have the date.
     if (wheels.rows[0].timeUs < year2000Us && wheels.rows[0].timeUs + this.lateUs > year2000Us) {
