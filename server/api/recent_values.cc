@@ -3,6 +3,7 @@
 #include <ranges>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "base/try.h"
 #include "server/api/common_parameters.h"

@@ -256,6 +256,13 @@ void Meter::describe_state(const Node& node, MeterPoint& point) const {
   }
 }
 
+void Meter::keep_last(const Node& node) {
+  if (last_ == nullptr)
+    last_ = std::make_unique<Node>(node);
+  else
+    *last_ = node;
+}
+
 Result<void> Meter::settle(std::size_t index) {
   const signals::Sample& sample = waiting_[index].sample;
   const std::size_t place = fill_window(index);
@@ -272,7 +279,7 @@ Result<void> Meter::settle(std::size_t index) {
                  std::isfinite(sample.motor_current_a[0]) && std::isfinite(sample.motor_current_a[1])}};
   node.evaluate(model_);
   if (counted_utime_us_ && sample.utime_us <= *counted_utime_us_) {
-    last_ = std::make_unique<Node>(node);
+    keep_last(node);
     origin_utime_us_ = sample.utime_us;
     return {};
   }
@@ -292,7 +299,7 @@ Result<void> Meter::settle(std::size_t index) {
   node.reading.motion.copper_heat_w = copper_heat_w_;
   if (model_.parameters().thermal_resistance_k_w > 0) node.evaluate(model_);
   describe_state(node, point);
-  last_ = std::make_unique<Node>(node);
+  keep_last(node);
   emit_(point);
   return outcome;
 }

@@ -107,6 +107,7 @@ class Meter {
   Result<void> integrate_to(const Node& node, double interval_s);
   void skip_gap(double interval_s);
   void describe_state(const Node& node, MeterPoint& point) const;
+  void keep_last(const Node& node);
   Result<void> settle(std::size_t index);
 
   dynamics::DriveModel model_;

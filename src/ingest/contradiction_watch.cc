@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "plausibility/check.h"
 #include "telemetry/impossible.h"
