@@ -22,7 +22,7 @@ LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const
       stop_(std::move(stop)) {
   const auto effects = dynamics::active_effects(model.robot);
   on_floor_ = effects && std::ranges::any_of(*effects, [](const dynamics::ActiveEffect& active) {
-                return active.effect->info().needs_position || active.effect->info().needs_heading;
+                return active.effect->info().depends_on_place();
               });
 }
 

@@ -524,7 +524,7 @@ MatrixRow Matrix::row(std::size_t r, const std::stop_token& stop) const {
     out.model_version = robot.model->version;
     const auto effects = *dynamics::active_effects(robot.model->robot);
     for (const dynamics::ActiveEffect& active : effects)
-      if (active.effect->info().needs_position || active.effect->info().needs_heading)
+      if (active.effect->info().depends_on_place())
         out.neglected_effects.emplace_back(active.effect->info().id);
     if (s.matrix != nullptr) {
       const CostTable& table = *s.matrix->robot(r).table;

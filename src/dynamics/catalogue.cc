@@ -2,45 +2,16 @@
 
 #include <algorithm>
 #include <string>
-#include <tuple>
 
 #include "base/bounds.h"
 #include "base/nearest_word.h"
-#include "dynamics/effects/battery_side.h"
-#include "dynamics/effects/inertia.h"
-#include "dynamics/effects/kinematics.h"
-#include "dynamics/effects/motor.h"
-#include "dynamics/effects/sensors.h"
-#include "dynamics/effects/wheel_torque.h"
 
 namespace joulecast::dynamics {
-namespace {
-
-template <class... Effects>
-std::array<const Effect*, sizeof...(Effects)> table_of() {
-  static const std::tuple<EffectOf<Effects>...> effects;
-  return {&std::get<EffectOf<Effects>>(effects)...};
-}
-
-// In the order in which they are applied.
-const std::array table =
-    table_of<CoulombFriction, ViscousFriction, StribeckFriction, FrictionAsymmetry, LoadRollingResistance,
-             FloorResistanceZone, Slope, Grade, AerodynamicDrag, TurningScrub, GearEfficiency,
-             ChassisMassError, PayloadMassError, YawInertiaError, LinearInertiaError, ComOffset,
-             ResistanceError, WindingTemperature, BrushDrop, TorqueConstantLoss, Inductance, AccessoryLoad,
-             DriverLoss, NoRegeneration, BatteryResistance, WheelRadiusError, WheelRadiusAsymmetry,
-             TrackError, WheelSlip, CurrentSensorGain, CurrentSensorBias, VoltageSensorGain, SensorDelay>();
-
-}  // namespace
-
-std::span<const Effect* const> catalogue() {
-  return table;
-}
 
 const Effect* find_effect(std::string_view id) {
   const auto found =
-      std::ranges::find_if(table, [&](const Effect* effect) { return effect->info().id == id; });
-  return found == table.end() ? nullptr : *found;
+      std::ranges::find_if(catalogue(), [&](const Effect* effect) { return effect->info().id == id; });
+  return found == catalogue().end() ? nullptr : *found;
 }
 
 ActiveEffect initial(const Effect& effect) {

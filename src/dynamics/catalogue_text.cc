@@ -43,9 +43,9 @@ void add_entry(std::string& out, const EffectInfo& info) {
            " | " + (&p == info.parameters.data() ? "required" : number(p.initial)) + " | " + cell(p.meaning) +
            " |\n";
   out += "\nHolds for: " + std::string(info.validity) + ".";
-  if (info.needs_position) out += " Needs the position on the map.";
-  if (info.needs_heading) out += " Needs the heading.";
-  if (info.needs_climb) out += " Needs the climb: `pitch`, or the covariate `height_m`.";
+  if (info.needs == Needs::position) out += " Needs the position on the map.";
+  if (info.needs == Needs::heading) out += " Needs the heading.";
+  if (info.needs == Needs::climb) out += " Needs the climb: `pitch`, or the covariate `height_m`.";
   out += "\nSource: " + std::string(info.source) + ".\n\n";
 }
 

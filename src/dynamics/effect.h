@@ -1,9 +1,8 @@
 #pragma once
 
 #include <array>
-#include <cmath>
-#include <span>
 #include <string_view>
+#include <vector>
 
 #include "dynamics/dual.h"
 #include "dynamics/motion.h"
@@ -24,6 +23,9 @@ struct EffectParameter {
   bool strength = false;  // like the first: acts alone, and adds up over repeated findings
 };
 
+// What an effect depends on besides the motion of the wheels; while that is unknown, the effect is absent.
+enum class Needs { nothing, position, heading, climb };
+
 // Description of an effect for people and for tools; the bounds of its parameters are binding.
 struct EffectInfo {
   std::string_view id;
@@ -31,10 +33,10 @@ struct EffectInfo {
   std::string_view formula;
   std::string_view validity;
   std::string_view source;
-  std::span<const EffectParameter> parameters;
-  bool needs_position = false;  // no effect while the map position is unknown
-  bool needs_heading = false;   // no effect while the heading is unknown
-  bool needs_climb = false;     // no effect while the climb is unknown
+  std::vector<EffectParameter> parameters;
+  Needs needs = Needs::nothing;
+
+  bool depends_on_place() const { return needs == Needs::position || needs == Needs::heading; }
 };
 
 // Torques on the wheels that the motors must overcome, without inertia: [N m] at the wheel, positive
@@ -77,11 +79,8 @@ inline constexpr std::size_t max_effect_parameters = 5;
 template <class S>
 using EffectValues = std::array<S, max_effect_parameters>;
 
-// A physical effect that the nominal model leaves out. Implementations are in effects/: a struct
-// with a static `info` and whichever of these static templates it needs, for S double and Dual, so that every
-// derivative is exact:
-//   adjust(EffectValues<S>, Parameters<S>&)                          changes constants
-//   load(EffectValues<S>, const LoadContext<S>&, Loads<S>&)          adds torque at the wheels
+// A physical effect that the nominal model leaves out: it changes constants or adds torque at the wheels. For
+// double and Dual, so that every derivative is exact. The table of all is in effects.cc.
 class Effect {
  public:
   virtual ~Effect() = default;
@@ -91,41 +90,6 @@ class Effect {
   virtual void adjust(const EffectValues<Dual>&, Parameters<Dual>&) const = 0;
   virtual void load(const EffectValues<double>&, const LoadContext<double>&, Loads<double>&) const = 0;
   virtual void load(const EffectValues<Dual>&, const LoadContext<Dual>&, Loads<Dual>&) const = 0;
-};
-
-// Adapts one effect struct to the interface.
-template <class E>
-class EffectOf final : public Effect {
-  static constexpr bool has_adjust = requires(const EffectValues<double>& a, Parameters<double>& p) {
-    E::adjust(a, p);
-  };
-  static constexpr bool has_load =
-      requires(const EffectValues<double>& a, const LoadContext<double>& c, Loads<double>& l) {
-    E::load(a, c, l);
-  };
-  static_assert(has_adjust || has_load);
-
- public:
-  const EffectInfo& info() const override { return E::info; }
-  bool loads() const override { return has_load; }
-  void adjust(const EffectValues<double>& a, Parameters<double>& p) const override { adjust_any(a, p); }
-  void adjust(const EffectValues<Dual>& a, Parameters<Dual>& p) const override { adjust_any(a, p); }
-  void load(const EffectValues<double>& a, const LoadContext<double>& c, Loads<double>& l) const override {
-    load_any(a, c, l);
-  }
-  void load(const EffectValues<Dual>& a, const LoadContext<Dual>& c, Loads<Dual>& l) const override {
-    load_any(a, c, l);
-  }
-
- private:
-  template <class S>
-  static void adjust_any(const EffectValues<S>& a, Parameters<S>& p) {
-    if constexpr (has_adjust) E::adjust(a, p);
-  }
-  template <class S>
-  static void load_any(const EffectValues<S>& a, const LoadContext<S>& c, Loads<S>& l) {
-    if constexpr (has_load) E::load(a, c, l);
-  }
 };
 
 }  // namespace joulecast::dynamics

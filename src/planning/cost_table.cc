@@ -311,7 +311,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   robot::RobotModel placeless = robot;
   for (const dynamics::ActiveEffect& active : adopted) {
     const dynamics::EffectInfo& info = active.effect->info();
-    if (!info.needs_position && !info.needs_heading) continue;
+    if (!info.depends_on_place()) continue;
     table.neglected_.emplace_back(info.id);
     std::erase_if(placeless.effects, [&](const robot::AdoptedEffect& e) { return e.id == info.id; });
   }

@@ -26,8 +26,8 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
   DriveLoads loads{dynamics::DriveModel(robot, effects)};
   const auto& p = loads.model_.parameters();
   for (const dynamics::ActiveEffect& effect : effects) {
-    loads.needs_position_ |= effect.effect->info().needs_position;
-    loads.needs_heading_ |= effect.effect->info().needs_heading;
+    loads.needs_position_ |= effect.effect->info().needs == dynamics::Needs::position;
+    loads.needs_heading_ |= effect.effect->info().needs == dynamics::Needs::heading;
     if (effect.effect->info().id == "turning_scrub") loads.scrub_rate_rad_s_ = effect.values[1];
     if (effect.effect->info().id == "stribeck_friction") {
       for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.friction_torque_nm[s];

@@ -96,7 +96,7 @@ struct Limits {
   friend bool operator==(const Limits&, const Limits&) = default;
 };
 
-// An effect adopted from a diagnosis: its catalogue id and named parameters (src/dynamics/effects).
+// An effect adopted from a diagnosis: its catalogue id and named parameters (src/dynamics/effects.cc).
 struct AdoptedEffect {
   std::string id;
   std::vector<std::pair<std::string, double>> parameters;
