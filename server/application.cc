@@ -25,7 +25,7 @@
 #include "ingest/contradiction_watch.h"
 #include "ingest/ingest_service.h"
 #include "ingest/keeping.h"
-#include "ingest/model_loading.h"
+#include "ingest/model_registry.h"
 #include "ingest/refinement_watch.h"
 #include "ingest/stored_robot.h"
 #include "server/api/change.h"

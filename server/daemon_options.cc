@@ -10,7 +10,7 @@
 #include "access/secret_file.h"
 #include "base/host_clock.h"
 #include "base/try.h"
-#include "ingest/model_loading.h"
+#include "ingest/model_registry.h"
 #include "ingest/signature_gate.h"
 #include "server/http/admission.h"
 #include "server/http/delivery.h"

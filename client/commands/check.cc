@@ -26,7 +26,6 @@
 #include "robot/robot_file.h"
 #include "telemetry/event_log.h"
 #include "telemetry/log_recordings.h"
-#include "telemetry/recording_set.h"
 
 namespace joulecast::client {
 namespace {

@@ -10,7 +10,7 @@
 #include "robot/robot_model.h"
 #include "telemetry/channel_watch.h"
 #include "telemetry/csv_import.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 // Findings of `joulecast check`, for every kind of input.
 namespace joulecast::client {

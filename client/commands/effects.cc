@@ -2,7 +2,7 @@
 
 #include "client/commands/option.h"
 #include "client/commands/table.h"
-#include "dynamics/catalogue_text.h"
+#include "dynamics/catalogue.h"
 
 namespace joulecast::client {
 namespace {

@@ -35,7 +35,7 @@
 #include "gap/verdict/diagnosis_json.h"
 #include "report/report.h"
 #include "robot/robot_file.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::client {
 namespace {

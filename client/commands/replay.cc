@@ -21,7 +21,7 @@
 #include "history/open_store.h"
 #include "history/writer.h"
 #include "ingest/forecasts.h"
-#include "ingest/model_loading.h"
+#include "ingest/model_registry.h"
 #include "ingest/pipeline.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"

@@ -15,7 +15,7 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "describe/input.h"
-#include "ingest/model_loading.h"
+#include "ingest/model_registry.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 

@@ -1,11 +1,10 @@
-#include "ingest/recent_values.h"
-
 #include <ranges>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "base/try.h"
+#include "ingest/fleet_view.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 

@@ -13,7 +13,6 @@
 #include "ingest/forecasts.h"
 #include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
-#include "ingest/recent_values.h"
 #include "planning/cost_table_cache.h"
 #include "server/api/attention.h"
 #include "server/cluster/cluster.h"

@@ -1,7 +1,7 @@
 // Prints the catalogue of effects for the reference that the daemon serves.
 #include <iostream>
 
-#include "dynamics/catalogue_text.h"
+#include "dynamics/catalogue.h"
 
 int main() {
   std::cout << joulecast::dynamics::catalogue_markdown() << std::flush;

@@ -10,7 +10,7 @@
 #include "answers/drive.h"
 #include "answers/model.h"
 #include "describe/schema.h"
-#include "forecast/limitation.h"
+#include "forecast/leg_cost.h"
 #include "forecast/outlook.h"
 #include "planning/cost_table_cache.h"
 

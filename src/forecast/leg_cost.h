@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "base/error.h"
@@ -101,5 +102,17 @@ class LegPricer {
   double standing_w_;
   mutable std::vector<Power> known_;
 };
+
+// A pace that a robot's motors do not reach with a payload, within its current limit and its battery's
+// nominal voltage.
+struct Limitation {
+  bool moves = true;  // slower, at `reached`; else not at all
+  Pace reached;
+  std::string sentence;
+};
+
+// Straight ahead and turning in place; empty where the pace is reached.
+std::optional<Limitation> limitation(const LegPricer& pricer, const robot::RobotModel& robot,
+                                     const Pace& wanted, double payload_kg);
 
 }  // namespace joulecast::forecast

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "ingest/held_messages.h"
 #include "ingest/inbound_message.h"
 #include "ingest/keeping.h"
 #include "ingest/robot_session.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "robot/robot_model.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 // Checks of a robot's recordings before any physics is estimated: signs, units, scales, channels, motors,
 // kinematics, the clock and the robot file.

@@ -10,7 +10,7 @@
 
 #include "base/json_text.h"
 #include "base/try.h"
-#include "describe/schema_faults.h"
+#include "describe/schema.h"
 #include "telemetry/stamp.h"
 
 namespace joulecast::telemetry {

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "base/try.h"
@@ -112,6 +114,62 @@ class Collector {
   std::vector<std::vector<signals::CovariateChange>> changes_;  // of each recording
 };
 
+// At most three of the names, then how many more.
+std::string listed(const std::set<std::string, std::less<>>& names) {
+  std::string text;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (count == 3) return text + " and " + std::to_string(names.size() - count) + " more";
+    text += (count++ > 0 ? ", " : "") + name;
+  }
+  return text;
+}
+
+constexpr std::size_t enough_samples = 10;  // to estimate their rate
+constexpr double greatest_rate_hz = 1100;   // of a robot; faster ones are another unit's
+
+double rate_hz(const Recording& mission) {
+  const std::size_t samples = mission.samples.size();
+  return samples < enough_samples ? 0 : static_cast<double>(samples - 1) / length_s(mission);
+}
+
+bool same(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
+
+// Short missions in a row with one payload become one recording. A pause between them is a gap.
+std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::string>& notes) {
+  std::vector<Recording> result;
+  std::vector<std::string> names;  // joined into the last of the result
+  const auto report = [&] {
+    if (names.size() > 1)
+      notes.push_back(fmt::format("missions {} last less than {:g} s each and were joined",
+                                  listed({names.begin(), names.end()}), shortest_mission_s));
+    names.clear();
+  };
+  for (Recording& mission : missions) {
+    const bool is_short = length_s(mission) < shortest_mission_s;
+    const std::string name = mission.mission_id;
+    if (is_short && !names.empty() && same(result.back().payload_kg, mission.payload_kg)) {
+      Recording& whole = result.back();
+      whole.samples.insert(whole.samples.end(), mission.samples.begin(), mission.samples.end());
+      std::vector<signals::CovariateChange> changes = signals::changes_of(whole.covariates);
+      const std::vector<signals::CovariateChange> more = signals::changes_of(mission.covariates);
+      changes.insert(changes.end(), more.begin(), more.end());
+      whole.covariates = signals::series_of(changes);
+    } else {
+      report();
+      result.push_back(std::move(mission));
+    }
+    if (is_short)
+      names.push_back(name);
+    else
+      report();
+  }
+  report();
+  return result;
+}
+
 }  // namespace
 
 std::string channel_list(const std::set<std::string, std::less<>>& channels) {
@@ -143,6 +201,88 @@ Result<LogRecordings> read_recordings(std::span<const std::string> paths, const 
   }
   if (!paths.empty()) TRY(need_robots(paths.front(), tally));
   return collector.finish(tally.damaged_places);
+}
+
+std::string in_other_unit(std::string_view field, double value) {
+  if (field == "utime") return value > 0 ? " (in ns?)" : "";
+  if (field.ends_with("_current")) return " (in mA?)";
+  return field.ends_with("_voltage") ? " (in mV?)" : "";
+}
+
+Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Recording> missions) {
+  RecordingSet set;
+  set.robot_id = std::move(robot_id);
+  std::size_t without_speed = 0, twice = 0;
+  double fastest_hz = 0;
+  std::erase_if(missions, [&](Recording& mission) {
+    std::vector<signals::Sample>& samples = mission.samples;
+    without_speed += std::erase_if(samples, [](const signals::Sample& s) {
+      return !std::isfinite(s.wheel_velocity_rad_s[0]) || !std::isfinite(s.wheel_velocity_rad_s[1]);
+    });
+    twice += put_in_order(samples);
+    fastest_hz = std::max(fastest_hz, samples.size() < 2 ? 0 : rate_hz(mission));
+    if (samples.size() >= 2) return false;
+    set.notes.push_back("mission " + mission.mission_id + " contains no motion and was left out");
+    return true;
+  });
+  if (without_speed > 0)
+    set.notes.push_back(fmt::format("{} samples without wheel speeds were left out", without_speed));
+  if (twice > 0)
+    set.notes.push_back(fmt::format("{} samples have the time of another and were left out", twice));
+  std::ranges::stable_sort(missions, {}, [](const Recording& m) { return m.samples.front().utime_us; });
+  for (Recording& mission : joined(std::move(missions), set.notes)) {
+    if (length_s(mission) < shortest_mission_s) {
+      set.notes.push_back(fmt::format("mission {} lasts {:.3g} s, less than {:g} s, and was left out",
+                                      mission.mission_id, length_s(mission), shortest_mission_s));
+      continue;
+    }
+    set.samples += mission.samples.size();
+    set.missions.push_back(std::move(mission));
+  }
+  if (!set.missions.empty()) return set;
+  const std::string none = fmt::format("contains no mission of at least {:g} s", shortest_mission_s);
+  if (fastest_hz < greatest_rate_hz) return invalid("log", none);
+  return invalid("utime", fmt::format("{}, as samples would come {:.3g} times a second: is utime given in ms "
+                                      "or s? joulecast expects us since 1970",
+                                      none, fastest_hz));
+}
+
+Result<void> need_robot(const LogRecordings& log, const std::string& robot_id) {
+  if (log.robots.empty()) return invalid("log", "contains no telemetry");
+  if (!robot_id.empty() && !log.robots.contains(robot_id))
+    return invalid("log", "contains no telemetry of " + robot_id + ", only of " + listed(log.robots));
+  return {};
+}
+
+Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id,
+                                     const LogObserver& passed) {
+  TRY_ASSIGN(LogRecordings log, read_recordings(paths, robot_id, passed));
+  TRY(need_robot(log, robot_id));
+  if (robot_id.empty() && log.robots.size() > 1)
+    return invalid("log", fmt::format("contains {} robots, {}; select one with --robot-id", log.robots.size(),
+                                      listed(log.robots)));
+  Result<RecordingSet> set =
+      make_recording_set(robot_id.empty() ? *log.robots.begin() : robot_id, std::move(log.recordings));
+  std::string beyond_ranges;
+  for (const auto& [field, beyond] : log.beyond_range)
+    beyond_ranges +=
+        fmt::format("{}{} samples have an impossible {}, up to {:.4g}{}", beyond_ranges.empty() ? "" : "; ",
+                    beyond.samples, field, beyond.farthest, in_other_unit(field, beyond.farthest));
+  if (!set) {
+    if (!beyond_ranges.empty()) set.error().message += ": " + beyond_ranges;
+    if (log.beyond_range.contains("utime")) set.error().field = "utime";
+    return set;
+  }
+  set->beyond_range = std::move(log.beyond_range);
+  set->unreadable = log.unreadable;
+  if (log.unreadable > 0)
+    set->notes.push_back(
+        fmt::format("{} messages or values could not be read, exceed a limit or are duplicates{}{}",
+                    log.unreadable, beyond_ranges.empty() ? "" : "; of these ", beyond_ranges));
+  if (log.samples_outside > 0)
+    set->notes.push_back(fmt::format(
+        "{} samples before a mission's start or just after its end were left out", log.samples_outside));
+  return set;
 }
 
 }  // namespace joulecast::telemetry

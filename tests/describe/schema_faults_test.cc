@@ -1,8 +1,8 @@
-#include "describe/schema_faults.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
+
+#include "describe/schema.h"
 
 namespace joulecast::described {
 namespace {

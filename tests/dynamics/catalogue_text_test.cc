@@ -1,5 +1,3 @@
-#include "dynamics/catalogue_text.h"
-
 #include <gtest/gtest.h>
 
 #include <string>

@@ -1,10 +1,10 @@
-#include "energy/acceleration_filter.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "energy/meter.h"
 
 namespace joulecast::energy {
 namespace {

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "forecast/limitation.h"
 #include "planning/baseline.h"
 #include "robots.h"
 

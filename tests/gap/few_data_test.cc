@@ -8,7 +8,7 @@
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
 #include "robot/robot_file.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::gap {
 namespace {

@@ -1,6 +1,6 @@
-#include "ingest/recent_values.h"
-
 #include <gtest/gtest.h>
+
+#include "ingest/fleet_view.h"
 
 namespace joulecast::ingest {
 namespace {

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "ingest/fleet_view.h"
-#include "ingest/held_messages.h"
+#include "ingest/keeping.h"
 #include "ingest/pipeline.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"

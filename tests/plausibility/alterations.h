@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "plausibility/readings.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 // Alterations of correct recordings in memory.
 namespace joulecast::alter {

@@ -10,7 +10,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
 #include "signals/mission_event.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 #include "tests/support/simulated_missions.h"
 
 namespace joulecast::made {

@@ -12,7 +12,7 @@
 #include <set>
 #include <string>
 
-#include "describe/schema_faults.h"
+#include "describe/schema.h"
 #include "robot/robot_fields.h"
 
 namespace joulecast::robot {

@@ -1,4 +1,3 @@
-#include "telemetry/recording_set.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "gap/verdict/diagnosis.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::gap {
 

@@ -5,7 +5,7 @@
 
 #include "dynamics/catalogue.h"
 #include "robot/robot_model.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::gap {
 

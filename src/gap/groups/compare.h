@@ -9,7 +9,7 @@
 #include "base/error.h"
 #include "gap/runs/run_table.h"
 #include "gap/verdict/diagnosis.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::gap {
 

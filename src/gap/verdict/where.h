@@ -5,7 +5,7 @@
 
 #include "gap/equations/channels.h"
 #include "gap/verdict/diagnosis.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::gap {
 

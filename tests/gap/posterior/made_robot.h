@@ -11,7 +11,7 @@
 #include "gap/posterior/data.h"
 #include "gap/posterior/explain_recordings.h"
 #include "robot/robot_file.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::gap::posterior::made {
 

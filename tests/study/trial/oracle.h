@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "robot/robot_model.h"
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 #include "tests/study/trial/case_files.h"
 
 namespace joulecast::trial {

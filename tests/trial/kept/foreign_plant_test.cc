@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "telemetry/recording_set.h"
+#include "telemetry/log_recordings.h"
 #include "tests/study/trial/foreign/foreign_case.h"
 
 namespace joulecast::trial::foreign {
