@@ -16,7 +16,6 @@
 #include "answers/autonomy.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
-#include "base/sleep.h"
 #include "base/try.h"
 #include "history/open_store.h"
 #include "history/spool.h"

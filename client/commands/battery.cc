@@ -6,7 +6,7 @@
 
 #include "base/try.h"
 #include "battery/circuit.h"
-#include "battery/prediction.h"
+#include "battery/discharge.h"
 #include "client/commands/option.h"
 #include "client/commands/print.h"
 #include "client/commands/table.h"

@@ -22,7 +22,7 @@
 #include "robot/robot_file.h"
 #include "telemetry/impossible.h"
 #include "telemetry/log_recordings.h"
-#include "telemetry/recording_climb.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::energy {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DriveCalibration, blocks, windows, slowest_rad_s, fastest_rad_s,

@@ -93,8 +93,8 @@ Result<void> check_robot_file(const std::string& path, Report& report) {
     return {};
   }
   const auto problems = robot::problems_of(*document);
-  for (const robot::RobotProblem& problem : problems)
-    report.findings.push_back({true, path, problem.pointer, problem.says});
+  for (const FieldFault& problem : problems)
+    report.findings.push_back({true, path, problem.field, problem.says});
   if (!problems.empty()) return {};
   const robot::RobotModel model = robot::read_robot(*document).value();
   check_model(model, path, report);

@@ -32,7 +32,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "client/virtual_robot/truth.h"
 #include "signals/ids.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"

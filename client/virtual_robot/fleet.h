@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/virtual_robot/virtual_robot.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::virtual_robot {
 

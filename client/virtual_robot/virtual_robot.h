@@ -14,7 +14,6 @@
 #include "client/virtual_robot/robot_parameters.h"
 #include "client/virtual_robot/sensors.h"
 #include "signals/covariates.h"
-#include "signals/mission_event.h"
 #include "signals/sample.h"
 
 namespace joulecast::virtual_robot {

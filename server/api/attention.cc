@@ -8,8 +8,8 @@
 #include <set>
 
 #include "base/fault_boundary.h"
+#include "base/host_clock.h"
 #include "base/json_number.h"
-#include "base/sleep.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "describe/input.h"

@@ -7,10 +7,10 @@
 
 #include "answers/mission.h"
 #include "base/try.h"
-#include "robot/kind.h"
+#include "robot/robot_fields.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
-#include "signals/account_ratios.h"
+#include "signals/ledger.h"
 
 namespace joulecast::api {
 namespace {

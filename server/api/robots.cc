@@ -189,8 +189,8 @@ const Table<RobotCheck>& check_table() {
 
 Result<Response> check_file(const Services&, const Request& request) {
   RobotCheck check;
-  for (const robot::RobotProblem& problem : robot::problems_of(*request.json))
-    check.findings.push_back({true, problem.pointer, 0, problem.says});
+  for (const FieldFault& problem : robot::problems_of(*request.json))
+    check.findings.push_back({true, problem.field, 0, problem.says});
   if (check.findings.empty()) {
     TRY_ASSIGN(const robot::RobotModel model, robot::read_robot(*request.json));
     if (const auto effects = dynamics::active_effects(model); !effects)

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "base/fault_boundary.h"
-#include "base/sleep.h"
+#include "base/host_clock.h"
 #include "base/try.h"
 #include "robot/robot_file.h"
 #include "server/cluster/assignment.h"

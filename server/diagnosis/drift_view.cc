@@ -7,7 +7,7 @@
 #include "base/json_number.h"
 #include "base/try.h"
 #include "energy/drive_equations.h"
-#include "robot/kind.h"
+#include "robot/robot_fields.h"
 
 namespace joulecast::server {
 namespace {

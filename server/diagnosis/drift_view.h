@@ -41,8 +41,8 @@ class DriftView {
   // Its newest missions under the model in force.
   Result<std::vector<drift::MissionRatio>> recent(const ingest::ModelInForce& model) const;
 
-  // Robots of its kind (robot/kind.h), itself among them, that have enough missions, compared by their
-  // recent() ones; none where the robot has no model.
+  // Robots of its kind (robot/robot_fields.h), itself among them, that have enough missions, compared by
+  // their recent() ones; none where the robot has no model.
   Result<std::vector<drift::SiblingRatio>> siblings(const std::string& robot_id) const;
   // The comparison of robots of one kind by their recent() missions.
   std::vector<drift::SiblingRatio> compare(const std::vector<drift::RobotRatios>& kind) const {

@@ -8,7 +8,7 @@
 #include "base/median.h"
 #include "base/try.h"
 #include "gap/traits.h"
-#include "robot/kind.h"
+#include "robot/robot_fields.h"
 
 namespace joulecast::server {
 namespace {

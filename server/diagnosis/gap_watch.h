@@ -40,7 +40,7 @@ struct WatchCounts {
 
 // The result of the newest look at one robot.
 struct WatchFinding {
-  std::string kind;                               // robot/kind.h
+  std::string kind;                               // robot/robot_fields.h
   drift::RobotRatios newest;                      // its newest missions under the model in force
   std::optional<drift::Mark> change;              // its newest mark, under any model
   std::optional<drift::SiblingRatio> among_kind;  // absent with too few missions

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "battery/cell_shapes.h"
+#include "battery/circuit.h"
 #include "describe/table.h"
 
 namespace joulecast::answers {
@@ -179,7 +179,7 @@ BatteryStatus battery_status(const robot::Battery& battery, const forecast::Char
     s.voltage_v = map.circuit().inner_voltage_v(battery::Circuit::rested(s.charge));
   s.range_m = reach.range_m[0];
   s.run_time_s = reach.run_time_s[0];
-  const std::string_view chemistry = battery::detect_pack(battery.nominal_voltage_v).cell->chemistry;
+  const std::string_view chemistry = battery::likeliest_cell(battery.nominal_voltage_v).chemistry;
   if (chemistry.find("phosphate") != std::string_view::npos) {
     s.ros_technology = ros_iron_phosphate;
   } else if (chemistry.find("lithium") != std::string_view::npos) {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include "signals/account_ratios.h"
+#include "signals/ledger.h"
 #include "signals/sample.h"
 
 namespace joulecast::answers {

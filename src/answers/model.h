@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "battery/charging.h"
 #include "dynamics/drive_model.h"
-#include "forecast/charge_map.h"
+#include "forecast/outlook.h"
 #include "forecast/robot_forecast.h"
 #include "planning/path.h"
 #include "planning/planner.h"

@@ -3,6 +3,7 @@
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
+#include <vector>
 
 namespace joulecast {
 
@@ -36,6 +37,19 @@ inline tl::unexpected<Error> fail(Fault fault, std::string field, std::string me
 
 inline tl::unexpected<Error> invalid(std::string field, std::string message) {
   return fail(Fault::invalid, std::move(field), std::move(message));
+}
+
+// What is wrong with one member of a document: its JSON pointer, and a sentence.
+struct FieldFault {
+  std::string field, says;
+};
+
+// All of at least one fault as one error, at the first one's place.
+inline Error error_of(const std::vector<FieldFault>& faults) {
+  Error error{Fault::invalid, faults.front().field, faults.front().says};
+  for (std::size_t k = 1; k < faults.size(); ++k)
+    error.message += "; " + faults[k].field + ": " + faults[k].says;
+  return error;
 }
 
 // "field: message", or the message alone.

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
 #include <ctime>
 #include <functional>
+#include <mutex>
+#include <stop_token>
 #include <utility>
 
 namespace joulecast {
@@ -21,6 +24,15 @@ inline std::int64_t host_boot_us() {
   timespec now{};
   clock_gettime(CLOCK_BOOTTIME, &now);
   return std::int64_t{1'000'000} * now.tv_sec + now.tv_nsec / 1000;
+}
+
+// Sleeps for the time; false, immediately, if the thread is to stop.
+inline bool sleep_for(const std::stop_token& stop, std::chrono::steady_clock::duration time) {
+  std::mutex mutex;
+  std::condition_variable_any wake;
+  std::unique_lock lock(mutex);  // cppcheck-suppress localMutex
+  wake.wait_for(lock, stop, time, [] { return false; });
+  return !stop.stop_requested();
 }
 
 // Finds the steps of the host's clock: differences between its advance and the elapsed time.

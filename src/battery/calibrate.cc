@@ -11,7 +11,6 @@
 
 #include "base/median.h"
 #include "base/try.h"
-#include "battery/cell_shapes.h"
 #include "battery/circuit.h"
 #include "robot/robot_file.h"
 

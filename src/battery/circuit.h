@@ -2,11 +2,48 @@
 
 #include <array>
 #include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
 
-#include "battery/cell_shapes.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::battery {
+
+// A typical cell of one chemistry, used until a battery is calibrated.
+struct CellShape {
+  std::string_view chemistry;
+  std::span<const double> usual_nominal_v;  // as printed by makers, for one cell
+  double cutoff_v;
+  std::span<const std::pair<double, double>> open_circuit_voltage;  // (charge, V), from 0 to 1
+};
+
+// That of which some number has the printed voltage closest to `nominal_voltage_v` > 0; of equally close ones
+// lithium-ion, then iron phosphate, then lead. Lead comes in blocks of three cells (6 V) only.
+const CellShape& likeliest_cell(double nominal_voltage_v);
+
+// The pack's open-circuit voltage, scaled so that its mean over charge is the nominal voltage: a full pack
+// holds nominal_voltage_v * capacity_ah watt-hours.
+std::vector<std::pair<double, double>> default_open_circuit_voltage(double nominal_voltage_v);
+
+double default_cutoff_voltage_v(double nominal_voltage_v);
+
+// A piecewise linear function through points of ascending x.
+class Curve {
+ public:
+  // At least one point, x strictly ascending.
+  explicit Curve(std::vector<std::pair<double, double>> points);
+
+  double held(double x) const;      // constant beyond the ends
+  double extended(double x) const;  // beyond the ends, along the first and the last piece
+  double mean() const;              // over [first x, last x]
+
+ private:
+  std::size_t piece(double x) const;
+
+  std::vector<std::pair<double, double>> points_;
+};
 
 inline constexpr double reference_temperature_c = 25.0;
 
@@ -30,8 +67,9 @@ struct State {
 // near empty this, not resistance, ends a discharge. The losses I (U(s) - V) heat one lumped mass: tau_T T' =
 // R_T I (U - V) - (T - T_ambient); without thermal parameters the temperature stays as given.
 // Values missing in the robot file have defaults: the open-circuit shape of the likeliest chemistry
-// (cell_shapes.h), constant resistance, no branches, no lags, no effect of temperature. Beyond charge 0 and 1
-// the voltage goes on along the last piece of its curve, so that a voltage threshold is always crossed.
+// (default_open_circuit_voltage), constant resistance, no branches, no lags, no effect of temperature. Beyond
+// charge 0 and 1 the voltage goes on along the last piece of its curve, so that a voltage threshold is always
+// crossed.
 class Circuit {
  public:
   // The battery must satisfy the robot file's constraints (robot::validate).

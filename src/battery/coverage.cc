@@ -9,7 +9,6 @@
 #include "base/try.h"
 #include "battery/circuit.h"
 #include "battery/discharge.h"
-#include "battery/prediction.h"
 
 namespace joulecast::battery {
 namespace {

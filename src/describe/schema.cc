@@ -67,7 +67,7 @@ std::string list(const Schema& texts, const std::string& between) {
 class Check {
  public:
   explicit Check(const Schema& root) : root_(root) {}
-  std::vector<SchemaFault> faults;
+  std::vector<FieldFault> faults;
 
   void value(const Schema& unresolved, const Json& given, const std::string& at) {
     const Schema schema = resolved(unresolved);
@@ -231,7 +231,7 @@ Schema with_words(Schema schema, std::string_view words, const Schema& limits) {
   return schema;
 }
 
-std::vector<SchemaFault> schema_faults(const Schema& schema, const Json& document) {
+std::vector<FieldFault> schema_faults(const Schema& schema, const Json& document) {
   Check check(schema);
   check.value(schema, document, "");
   return std::move(check.faults);

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/error.h"
+
 // A member, a member's member, or the result of its function, as a function of an object: AT(record.id).
 #define AT(path) [](auto& object) -> decltype(auto) { return (object.path); }
 
@@ -72,15 +74,10 @@ Schema of_value(bool or_null = false) {
     return of_type("string", or_null);
 }
 
-// A departure of a JSON document from its schema: the JSON pointer of a member, and a sentence.
-struct SchemaFault {
-  std::string field, says;
-};
-
-// All departures, in the order of the schema; empty: none. Keywords of JSON Schema 2020-12 that are checked:
-// $ref within the schema, type, enum, pattern, bounds of numbers and sizes, not with const, items,
-// properties, required, additionalProperties, unevaluatedProperties, propertyNames and oneOf. Patterns must
-// be bounded.
-std::vector<SchemaFault> schema_faults(const Schema& schema, const nlohmann::json& document);
+// All departures of a JSON document from its schema, in the order of the schema; empty: none. Keywords of
+// JSON Schema 2020-12 that are checked: $ref within the schema, type, enum, pattern, bounds of numbers and
+// sizes, not with const, items, properties, required, additionalProperties, unevaluatedProperties,
+// propertyNames and oneOf. Patterns must be bounded.
+std::vector<FieldFault> schema_faults(const Schema& schema, const nlohmann::json& document);
 
 }  // namespace joulecast::described

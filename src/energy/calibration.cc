@@ -13,7 +13,7 @@
 #include "base/try.h"
 #include "dynamics/drive_model.h"
 #include "energy/drive_equations.h"
-#include "energy/wheel_inertia.h"
+#include "energy/power_windows.h"
 #include "statistics/distributions.h"
 #include "telemetry/payload.h"
 #include "windows/windows.h"

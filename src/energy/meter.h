@@ -115,7 +115,6 @@ class Meter {
   const signals::Accounts& accounts() const { return accounts_; }
   std::size_t gaps() const { return gaps_; }  // intervals not integrated
   double gap_seconds() const { return gap_seconds_; }
-  const dynamics::DriveModel& model() const { return model_; }
 
  private:
   class Segment;

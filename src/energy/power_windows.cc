@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "energy/wheel_inertia.h"
 
 namespace joulecast::energy {
 namespace {
@@ -37,6 +36,10 @@ dynamics::ActiveEffect effect_of(std::string_view id, double strength) {
   dynamics::ActiveEffect effect = dynamics::initial(*dynamics::find_effect(id));
   effect.values[0] = strength;
   return effect;
+}
+
+double turning_arm(const robot::RobotModel& robot) {
+  return robot.kinematics.wheel_radius_m / (2 * robot.kinematics.half_track_m);
 }
 
 }  // namespace
@@ -269,6 +272,28 @@ Result<RegressionComparison> compare_with_regression(std::span<const telemetry::
   MissedPowerMeter missed;
   for (const windows::Window& w : held_back.windows) missed.add(w, by_file, by_corrected, regression);
   return RegressionComparison{held_back.windows.size(), missed.value()};
+}
+
+WheelInertia wheel_inertia(const robot::RobotModel& robot) {
+  const double r = robot.kinematics.wheel_radius_m, c = turning_arm(robot);
+  const double wheel = robot.mass.wheel_inertia_kg_m2 + robot.motor.rotor_inertia_kg_m2;
+  return {robot.total_mass_kg(0) * r * r / 2 + wheel, 2 * robot.mass.yaw_inertia_kg_m2 * c * c + wheel};
+}
+
+void place_straight_inertia(double straight_kg_m2, robot::RobotModel& robot) {
+  const double r = robot.kinematics.wheel_radius_m;
+  const double rotor = straight_kg_m2 - robot.total_mass_kg(0) * r * r / 2 - robot.mass.wheel_inertia_kg_m2;
+  robot.motor.rotor_inertia_kg_m2 = std::max(rotor, 0.0);
+  if (rotor >= 0) return;
+  const double mass = 2 * (straight_kg_m2 - robot.mass.wheel_inertia_kg_m2) / (r * r);
+  robot.mass.chassis_kg = std::max(mass - 2 * robot.mass.wheel_kg, 0.01 * robot.mass.chassis_kg);
+}
+
+void place_turning_inertia(double turning_kg_m2, robot::RobotModel& robot) {
+  const double c = turning_arm(robot);
+  const double yaw =
+      (turning_kg_m2 - robot.mass.wheel_inertia_kg_m2 - robot.motor.rotor_inertia_kg_m2) / (2 * c * c);
+  if (yaw > 0) robot.mass.yaw_inertia_kg_m2 = yaw;
 }
 
 }  // namespace joulecast::energy

@@ -18,6 +18,20 @@
 
 namespace joulecast::energy {
 
+// Inertia of an empty robot at each wheel's motor [kg m^2].
+struct WheelInertia {
+  double straight = 0;  // both wheels with the same acceleration: m r^2/2 + I_w + I_s
+  double turning = 0;   // they accelerate oppositely: 2 I c^2 + I_w + I_s, c = r/(2l)
+};
+
+WheelInertia wheel_inertia(const robot::RobotModel& robot);
+
+// Gives a robot this inertia [kg m^2]. Motion shows only the sums, so the rotor takes the inertia that the
+// file's mass does not explain; where the rotor's would be negative, the chassis is made lighter, down to a
+// hundredth of its mass. A turning inertia below that of wheels and rotors leaves the yaw inertia unchanged.
+void place_straight_inertia(double straight_kg_m2, robot::RobotModel& robot);
+void place_turning_inertia(double turning_kg_m2, robot::RobotModel& robot);
+
 // Parameters of a drive that battery power and motion may identify, at the wheel. The last three are effects
 // of the catalogue and count beyond the strengths that the robot file has adopted.
 struct PowerParameter {
@@ -26,8 +40,8 @@ struct PowerParameter {
     friction,             // mean of both sides
     friction_difference,  // right less left
     viscous,
-    straight_inertia,  // wheel_inertia.h
-    turning_inertia,   // wheel_inertia.h
+    straight_inertia,  // WheelInertia::straight
+    turning_inertia,   // WheelInertia::turning
     resistance,        // through the copper loss R (T/(K_t n))^2 alone
     turning_scrub,     // friction coefficient of turning contacts
     driver_loss,       // of the motors' absolute power

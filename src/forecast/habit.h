@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "forecast/leg.h"
-#include "forecast/prediction.h"
+#include "forecast/scores.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::forecast {

@@ -13,9 +13,7 @@
 #include "forecast/correction.h"
 #include "forecast/leg.h"
 #include "forecast/leg_cost.h"
-#include "forecast/prediction.h"
 #include "forecast/scores.h"
-#include "forecast/siblings.h"
 
 namespace joulecast::forecast {
 

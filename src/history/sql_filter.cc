@@ -10,7 +10,7 @@
 
 #include "base/text.h"
 #include "base/try.h"
-#include "signals/account_ratios.h"
+#include "signals/ledger.h"
 
 namespace joulecast::history {
 namespace {

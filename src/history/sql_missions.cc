@@ -8,7 +8,7 @@
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"
 #include "history/sql_rows.h"
-#include "signals/account_ratios.h"
+#include "signals/ledger.h"
 
 namespace joulecast::history {
 namespace {

@@ -16,7 +16,7 @@
 #include "signals/gaps.h"
 #include "signals/sample.h"
 #include "telemetry/covariate_tracker.h"
-#include "telemetry/recording_climb.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::ingest {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/try.h"
-#include "forecast/siblings.h"
-#include "robot/kind.h"
+#include "forecast/correction.h"
+#include "robot/robot_fields.h"
 
 namespace joulecast::ingest {
 namespace {

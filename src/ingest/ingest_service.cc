@@ -6,7 +6,7 @@
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
-#include "signals/energy_state.h"
+#include "signals/sample.h"
 
 namespace joulecast::ingest {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "base/error.h"
 #include "history/store.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::ingest {
 

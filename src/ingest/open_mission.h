@@ -7,6 +7,7 @@
 
 #include "energy/meter.h"
 #include "history/records.h"
+#include "history/trace_merge.h"
 #include "ingest/counters.h"
 #include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
@@ -58,6 +59,21 @@ struct OpenMission {
   double earlier_gap_s_ = 0;
   std::optional<std::int64_t> stepped_utime_us_;  // host's, when the robot's clock was first set
   std::int64_t booked_us_ = 0;                    // since then
+};
+
+// Folds the meter's points into the store's one-second trace buckets.
+class TraceBuilder {
+ public:
+  void begin();
+  // `accounts` and `state_of_charge` (0 to 1; NaN: unknown, the latest known one stays) as of the point.
+  void add(const energy::MeterPoint& point, const signals::Accounts& accounts, double state_of_charge);
+  // The buckets that changed since the last call; the newest one may come again, fuller.
+  std::vector<history::TraceBucket> take();
+
+ private:
+  std::vector<history::TraceBucket> finished_;
+  std::optional<history::BucketSum> open_;
+  bool touched_ = false;  // since the last take()
 };
 
 }  // namespace joulecast::ingest

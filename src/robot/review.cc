@@ -189,16 +189,11 @@ std::vector<ReviewFinding> review(const RobotModel& model) {
 }
 
 Result<void> plannable(const std::vector<ReviewFinding>& findings) {
-  Error error;
-  for (const ReviewFinding& finding : findings) {
-    if (!finding.fault) continue;
-    if (error.field.empty())
-      error = {Fault::invalid, finding.field, finding.says};
-    else
-      error.message += "; " + finding.field + ": " + finding.says;
-  }
-  if (error.field.empty()) return {};
-  return tl::unexpected(std::move(error));
+  std::vector<FieldFault> faults;
+  for (const ReviewFinding& finding : findings)
+    if (finding.fault) faults.push_back({finding.field, finding.says});
+  if (faults.empty()) return {};
+  return tl::unexpected(error_of(faults));
 }
 
 }  // namespace joulecast::robot

@@ -1,5 +1,7 @@
 #include "robot/robot_fields.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <boost/xpressive/xpressive_dynamic.hpp>
 
@@ -174,6 +176,13 @@ std::string_view unit_of(std::string_view name) {
   const auto unit = std::find_if(std::begin(units), std::end(units),
                                  [&](const Unit& candidate) { return name.ends_with(candidate.suffix); });
   return unit == std::end(units) ? std::string_view{} : unit->symbol;
+}
+
+std::string kind_of(const RobotModel& r) {
+  return fmt::format("{:.6g} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g} {:.6g}", r.mass.wheel_kg,
+                     r.mass.wheel_inertia_kg_m2, r.motor.gear_ratio, r.motor.inductance_h,
+                     r.battery.nominal_voltage_v, r.battery.capacity_ah, r.limits.current_a,
+                     r.limits.payload_kg);
 }
 
 }  // namespace joulecast::robot

@@ -87,4 +87,8 @@ bool is_effect_name(std::string_view text);  // effect_name_pattern, for effect 
 // The unit that ends a name ("speed_m_s" -> "m/s"), empty for pure numbers.
 std::string_view unit_of(std::string_view name);
 
+// Robots with the same text are of one kind: the parameters of their design, which no calibration, refinement
+// or diagnosis changes.
+std::string kind_of(const RobotModel& robot);
+
 }  // namespace joulecast::robot

@@ -29,28 +29,20 @@ class Problems {
 
   // Whether this pointer, one above or one below it has a problem already.
   bool at(std::string_view pointer) const {
-    return std::any_of(list_.begin(), list_.end(), [&](const RobotProblem& problem) {
-      return problem.pointer == pointer || is_below(problem.pointer, pointer) ||
-             is_below(pointer, problem.pointer);
+    return std::any_of(list_.begin(), list_.end(), [&](const FieldFault& problem) {
+      return problem.field == pointer || is_below(problem.field, pointer) || is_below(pointer, problem.field);
     });
   }
 
   bool none() const { return list_.empty(); }
-  const std::vector<RobotProblem>& list() const { return list_; }
-
-  Error error() const {
-    Error error{Fault::invalid, list_.front().pointer, list_.front().says};
-    for (auto problem = list_.begin() + 1; problem != list_.end(); ++problem)
-      error.message += fmt::format("; {}: {}", problem->pointer, problem->says);
-    return error;
-  }
+  const std::vector<FieldFault>& list() const { return list_; }
 
  private:
   static bool is_below(std::string_view pointer, std::string_view parent) {
     return pointer.size() > parent.size() && pointer.starts_with(parent) && pointer[parent.size()] == '/';
   }
 
-  std::vector<RobotProblem> list_;
+  std::vector<FieldFault> list_;
   std::set<std::string> pointers_;
 };
 
@@ -329,7 +321,7 @@ Result<Battery> parse_battery_document(const Json& document) {
   RobotModel model;
   read_document(Json::object({{"battery", document}}), is_battery_field, model, problems);
   check_battery(model.battery, problems);
-  if (!problems.none()) return tl::unexpected(problems.error());
+  if (!problems.none()) return tl::unexpected(error_of(problems.list()));
   return model.battery;
 }
 
@@ -397,7 +389,7 @@ std::string dumped(const Json& document, int indent) {
 
 }  // namespace
 
-std::vector<RobotProblem> problems_of(const Json& document) {
+std::vector<FieldFault> problems_of(const Json& document) {
   Problems problems;
   read_robot(document, problems);
   return problems.list();
@@ -406,7 +398,7 @@ std::vector<RobotProblem> problems_of(const Json& document) {
 Result<RobotModel> read_robot(const Json& document) {
   Problems problems;
   RobotModel model = read_robot(document, problems);
-  if (!problems.none()) return tl::unexpected(problems.error());
+  if (!problems.none()) return tl::unexpected(error_of(problems.list()));
   return model;
 }
 

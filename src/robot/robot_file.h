@@ -18,12 +18,8 @@ namespace joulecast::robot {
 Result<RobotModel> parse_robot(std::string_view json_text);
 Result<RobotModel> read_robot(const nlohmann::json& document);
 
-struct RobotProblem {
-  std::string pointer, says;
-};
-
 // The problems that read_robot reports in one message, one by one; empty: no problem.
-std::vector<RobotProblem> problems_of(const nlohmann::json& document);
+std::vector<FieldFault> problems_of(const nlohmann::json& document);
 
 // As parse_robot; an unreadable file is Fault::not_found, and its path stands before the message.
 Result<RobotModel> load_robot(const std::filesystem::path& path);

@@ -1,14 +1,21 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <string>
 #include <string_view>
 
 namespace joulecast::signals {
 
 inline constexpr double unmeasured = std::numeric_limits<double>::quiet_NaN();
+
+// Whether two readings are equal, or both unmeasured.
+inline bool same(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
 
 // One sample of robot_telemetry_t, free of LCM. Units and signs as in lcmtypes/robot_telemetry_t.lcm;
 // sides: [0] right, [1] left; NaN = not measured.
@@ -77,5 +84,38 @@ constexpr auto numbers_of(S& sample) {
   visit_fields(sample, [&](const SampleField&, auto& number) { numbers[k++] = &number; });
   return numbers;
 }
+
+enum class MissionPhase : std::int8_t { started = 1, finished = 2, aborted = 3 };
+
+// mission_event_t, free of LCM.
+struct MissionEvent {
+  std::int64_t utime_us = 0;
+  std::string mission_id;
+  MissionPhase phase = MissionPhase::started;
+  double payload_kg = unmeasured;
+  std::string note;
+};
+
+// energy_state_t, free of LCM: the energy state that is sent to a robot. Energies in J since the mission
+// began, leaving the battery positive; NaN: unknown.
+struct EnergyState {
+  std::int64_t utime_us = 0;
+  std::string robot_id;
+  std::string mission_id;  // empty: no mission open
+  std::int64_t model_version = 0;
+  double measured_power_w = unmeasured;
+  double modelled_power_w = unmeasured;
+  double measured_energy_j = unmeasured;
+  double modelled_energy_j = unmeasured;
+  double unexplained_energy_j = unmeasured;
+  double recovered_energy_j = unmeasured;
+  double state_of_charge = unmeasured;  // 0 to 1
+  double state_of_charge_sd = unmeasured;
+  double range_m = unmeasured;  // median
+  std::array<double, 2> range_band_m{unmeasured, unmeasured};
+  double run_time_s = unmeasured;  // median
+  std::array<double, 2> run_time_band_s{unmeasured, unmeasured};
+  std::array<double, 2> winding_temperature_c{unmeasured, unmeasured};
+};
 
 }  // namespace joulecast::signals

@@ -11,9 +11,7 @@
 
 #include "base/error.h"
 #include "signals/covariates.h"
-#include "signals/energy_state.h"
 #include "signals/ids.h"
-#include "signals/mission_event.h"
 #include "signals/sample.h"
 
 // The only entry of datagrams into the program: every length that a datagram declares is checked against the

@@ -6,10 +6,6 @@
 namespace joulecast::telemetry {
 namespace {
 
-bool same(double a, double b) noexcept {
-  return a == b || (std::isnan(a) && std::isnan(b));
-}
-
 // Of a label 0 is as good as nothing: it does not hold.
 bool says_something(std::string_view name, double value) noexcept {
   return !std::isnan(value) && !(signals::is_label(name) && value == 0);
@@ -29,7 +25,7 @@ CovariateTracker::Verdict CovariateTracker::take(std::int64_t utime_us, const si
     Held& held = known->second;
     clock_set = utime_us < held.utime_us - reorder_us_;
     if (utime_us < held.utime_us && !clock_set) return Verdict::late;
-    if (same(held.value, covariate.value)) {
+    if (signals::same(held.value, covariate.value)) {
       held.utime_us = utime_us;
       return Verdict::repeat;
     }

@@ -593,7 +593,7 @@ class Importer {
         signals::CovariateSeries& series = open_.recording.covariates[k];
         series.name = mapping_.covariates[k].name;
         const double last = series.value.empty() ? signals::unmeasured : series.value.back();
-        if (last == covariates[k] || (std::isnan(last) && std::isnan(covariates[k]))) continue;
+        if (signals::same(last, covariates[k])) continue;
         series.utime_us.push_back(utime_us);
         series.value.push_back(covariates[k]);
       }

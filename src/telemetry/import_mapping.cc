@@ -66,7 +66,7 @@ static void from_json(const Json& v, TableLayout& layout) {
 
 namespace {
 
-using Faults = std::vector<MappingFinding>;
+using Faults = std::vector<FieldFault>;
 
 // The object that a member is; without members where it is absent.
 const Json& members(const Json& v, const char* name) {
@@ -109,7 +109,7 @@ std::vector<ImportTarget> read_field(const std::string& name, const Json& field,
 // Returns the content, which is usable where there are no faults.
 ImportMapping read_mapping(const Json& v, Faults& faults) {
   static const described::Schema schema = described::Schema::parse(import_mapping_schema);
-  for (auto& [field, says] : described::schema_faults(schema, v)) faults.push_back({field, says});
+  faults = described::schema_faults(schema, v);
   ImportMapping content;
   if (!faults.empty()) return content;
   content.layout = read_layout(v, "", faults);
@@ -162,14 +162,10 @@ Result<ImportMapping> ImportMapping::parse(std::string_view text) {
   Faults faults;
   ImportMapping mapping = read_mapping(document, faults);
   if (faults.empty()) return mapping;
-  // One error of all, at the first one's place.
-  Error error{Fault::invalid, faults.front().field, faults.front().says};
-  for (std::size_t k = 1; k < faults.size(); ++k)
-    error.message += "; " + faults[k].field + ": " + faults[k].says;
-  return tl::unexpected(std::move(error));
+  return tl::unexpected(error_of(faults));
 }
 
-std::vector<MappingFinding> mapping_faults(std::string_view text) {
+std::vector<FieldFault> mapping_faults(std::string_view text) {
   const auto document = parse_json(text);
   if (!document) return {{document.error().field, document.error().message}};
   Faults faults;
@@ -177,7 +173,7 @@ std::vector<MappingFinding> mapping_faults(std::string_view text) {
   return faults;
 }
 
-std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
+std::vector<FieldFault> suspicious(const ImportMapping& mapping) {
   Faults found;
   std::map<std::string_view, const FieldExpression*> given;
   for (const ImportTarget& target : mapping.targets) given[target.name] = &target.expression;

@@ -110,13 +110,9 @@ struct ImportMapping {
   std::vector<ImportTarget> targets, covariates;
 };
 
-// A finding on a mapping: JSON pointer and sentence.
-struct MappingFinding {
-  std::string field, says;
-};
 // Every fault of a mapping's text, of which parse() makes one error; empty where it has none.
-[[nodiscard]] std::vector<MappingFinding> mapping_faults(std::string_view text);
+[[nodiscard]] std::vector<FieldFault> mapping_faults(std::string_view text);
 // For a usable mapping: parts that are probably mistakes.
-[[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
+[[nodiscard]] std::vector<FieldFault> suspicious(const ImportMapping& mapping);
 
 }  // namespace joulecast::telemetry

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "base/try.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
 #include "telemetry/datagram.h"
@@ -133,10 +133,6 @@ double rate_hz(const Recording& mission) {
   return samples < enough_samples ? 0 : static_cast<double>(samples - 1) / length_s(mission);
 }
 
-bool same(double a, double b) {
-  return a == b || (std::isnan(a) && std::isnan(b));
-}
-
 // Short missions in a row with one payload become one recording. A pause between them is a gap.
 std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::string>& notes) {
   std::vector<Recording> result;
@@ -150,7 +146,7 @@ std::vector<Recording> joined(std::vector<Recording> missions, std::vector<std::
   for (Recording& mission : missions) {
     const bool is_short = length_s(mission) < shortest_mission_s;
     const std::string name = mission.mission_id;
-    if (is_short && !names.empty() && same(result.back().payload_kg, mission.payload_kg)) {
+    if (is_short && !names.empty() && signals::same(result.back().payload_kg, mission.payload_kg)) {
       Recording& whole = result.back();
       whole.samples.insert(whole.samples.end(), mission.samples.begin(), mission.samples.end());
       std::vector<signals::CovariateChange> changes = signals::changes_of(whole.covariates);

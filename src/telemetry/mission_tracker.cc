@@ -160,7 +160,6 @@ void MissionTracker::open(MissionActions& actions, std::string id, std::int64_t 
 }
 
 void MissionTracker::open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg) {
-  ++counters_.opened_implicit;
   std::string id = "implicit-" + std::to_string(utime_us);
   // A clock that starts again may do so at the same time.
   const auto same = std::ranges::count_if(past_, [&](const Past& past) { return past.start_us == utime_us; });
@@ -170,7 +169,6 @@ void MissionTracker::open_implicit(MissionActions& actions, std::int64_t utime_u
 
 void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note,
                            std::optional<std::int64_t> said_us) {
-  ++counters_.closed;
   // A sample may carry a slightly later clock than the event that ends its mission.
   const std::int64_t end_us = std::max(utime_us, current_->last_utime_us);
   if (end == MissionEnd::finished || end == MissionEnd::aborted) explicit_end_us_ = end_us;

@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "signals/mission_event.h"
 #include "signals/sample.h"
 
 namespace joulecast::telemetry {
@@ -61,8 +60,6 @@ struct SampleStep {
 };
 
 struct MissionCounters {
-  std::uint64_t opened_implicit = 0;
-  std::uint64_t closed = 0;
   std::uint64_t duplicate_events = 0;     // received already, or a late end of an ended mission
   std::uint64_t out_of_order_events = 0;  // older than the mission they would change
   std::uint64_t unknown_missions = 0;     // an end of a mission without a received start

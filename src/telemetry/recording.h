@@ -5,7 +5,10 @@
 #include <vector>
 
 #include "base/error.h"
+#include "dynamics/climb.h"
+#include "dynamics/parameters.h"
 #include "signals/covariates.h"
+#include "signals/gaps.h"
 #include "signals/sample.h"
 #include "telemetry/event_log.h"
 
@@ -34,5 +37,20 @@ std::size_t put_in_order(std::vector<signals::Sample>& samples);
 // there on, so that they do not hold in the recording that follows; stamped with the robot's clock.
 // Fault::invalid for a recording without samples or with ids or names out of bounds.
 Result<void> write_recording(EventLogWriter& log, const Recording& recording);
+
+// Samples in order of time as dynamics/climb.h reads them, on a robot of these parameters. Pitch that is
+// measured less often than samples come is held between gaps.
+class ClimbReader {
+ public:
+  dynamics::ClimbReading at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample,
+                            double height_m, signals::Step step);
+
+ private:
+  signals::HeldReading pitch_;
+};
+
+// The climb at each sample of a recording (dynamics::climb_along): from its pitch, else covariate height_m.
+[[nodiscard]] std::vector<double> climb_of(const Recording& recording,
+                                           const dynamics::Parameters<double>& parameters);
 
 }  // namespace joulecast::telemetry

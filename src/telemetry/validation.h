@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "signals/covariates.h"
-#include "signals/mission_event.h"
 #include "signals/sample.h"
 
 namespace joulecast::telemetry {

@@ -7,7 +7,7 @@
 #include "dynamics/parameters.h"
 #include "statistics/robust.h"
 #include "telemetry/payload.h"
-#include "telemetry/recording_climb.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::windows {
 namespace {

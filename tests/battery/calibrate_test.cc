@@ -6,7 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
-#include "battery/prediction.h"
+#include "battery/discharge.h"
 #include "robot/robot_file.h"
 #include "simulated_tests.h"
 #include "support.h"

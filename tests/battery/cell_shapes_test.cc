@@ -1,26 +1,22 @@
-#include "battery/cell_shapes.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "battery/circuit.h"
+
 namespace joulecast::battery {
 namespace {
 
-TEST(CellShapes, DetectsCommonPacks) {
+TEST(CellShapes, FindsChemistriesOfCommonPacks) {
   struct Case {
     double nominal_v;
     const char* chemistry;
-    int cells;
   };
-  for (const Case& item :
-       {Case{3.7, "lithium-ion", 1}, Case{14.8, "lithium-ion", 4}, Case{25.2, "lithium-ion", 7},
-        Case{36, "lithium-ion", 10}, Case{12.8, "lithium iron phosphate", 4},
-        Case{25.6, "lithium iron phosphate", 8}, Case{51.2, "lithium iron phosphate", 16},
-        Case{12, "lead-acid", 6}, Case{24, "lead-acid", 12}, Case{12.6, "lead-acid", 6}}) {
-    const Pack pack = detect_pack(item.nominal_v);
-    EXPECT_EQ(pack.cell->chemistry, item.chemistry) << item.nominal_v;
-    EXPECT_EQ(pack.cells_in_series, item.cells) << item.nominal_v;
+  for (const Case& item : {Case{3.7, "lithium-ion"}, Case{14.8, "lithium-ion"}, Case{25.2, "lithium-ion"},
+                           Case{36, "lithium-ion"}, Case{12.8, "lithium iron phosphate"},
+                           Case{25.6, "lithium iron phosphate"}, Case{51.2, "lithium iron phosphate"},
+                           Case{12, "lead-acid"}, Case{24, "lead-acid"}, Case{12.6, "lead-acid"}}) {
+    EXPECT_EQ(likeliest_cell(item.nominal_v).chemistry, item.chemistry) << item.nominal_v;
   }
 }
 

@@ -17,7 +17,7 @@
 
 #include "base/host_clock.h"
 #include "client/commands/table.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "tests/client/robots.h"
 #include "tests/support/simulated_missions.h"

@@ -9,7 +9,7 @@
 #include "dynamics/drive_model.h"
 #include "history/writer.h"
 #include "server/diagnosis/model_adoption.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 #include "tests/support/simulated_missions.h"

@@ -14,7 +14,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/proposal_review.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "tests/ingest/harness.h"
 
 namespace joulecast::server {

@@ -8,10 +8,10 @@
 #include <string_view>
 
 #include "client/virtual_robot/fleet.h"
-#include "robot/kind.h"
+#include "robot/robot_fields.h"
 #include "robot/robot_file.h"
 #include "server/diagnosis/proposal_review.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "tests/ingest/harness.h"
 
 namespace joulecast::server {

@@ -11,7 +11,7 @@
 
 #include "energy/calibration.h"
 #include "energy/power_calibration.h"
-#include "energy/wheel_inertia.h"
+#include "energy/power_windows.h"
 #include "robot/robot_file.h"
 #include "tests/study/trial/foreign/foreign_case.h"
 

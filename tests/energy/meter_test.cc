@@ -191,7 +191,7 @@ TEST(Meter, LedgerClosesAndExplainsEnergy) {
             a.ledger[signals::Term::recovered]);  // the nominal model returns all of it
 }
 
-// The bias and the latency stated in acceleration_filter.h, of a robot with a clock jitter of a tenth of its
+// The bias and the latency stated in meter.h, of a robot with a clock jitter of a tenth of its
 // interval.
 TEST(Meter, AccelerationErrorIsAsStated) {
   struct Rate {

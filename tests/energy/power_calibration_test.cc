@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "client/virtual_robot/fleet.h"
-#include "energy/wheel_inertia.h"
+#include "energy/power_windows.h"
 #include "robot/robot_file.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::energy {
 namespace {

@@ -9,7 +9,7 @@
 #include "client/virtual_robot/fleet.h"
 #include "energy/drive_equations.h"
 #include "robot/robot_file.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::energy {
 namespace {

@@ -1,10 +1,9 @@
-#include "forecast/charge_map.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "battery/discharge.h"
+#include "forecast/outlook.h"
 #include "robots.h"
 
 namespace joulecast::forecast {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "battery/cell_shapes.h"
+#include "battery/circuit.h"
 #include "client/virtual_robot/rng.h"
 #include "robots.h"
 

@@ -1,9 +1,8 @@
-#include "forecast/siblings.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "forecast/correction.h"
 #include "robots.h"
 
 namespace joulecast::forecast {

@@ -8,7 +8,7 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::forecast {
 namespace {

@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "fuzz.h"
-#include "signals/energy_state.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
 #include "telemetry/validation.h"

@@ -1,7 +1,7 @@
 #include <cstring>
 
 #include "fuzz.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/sequence_tracker.h"
 #include "telemetry/validation.h"

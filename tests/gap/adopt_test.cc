@@ -6,7 +6,7 @@
 
 #include "dynamics/catalogue.h"
 #include "gap/traits.h"
-#include "robot/kind.h"
+#include "robot/robot_fields.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::gap {

@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 

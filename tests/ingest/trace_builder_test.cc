@@ -1,8 +1,8 @@
-#include "ingest/trace_builder.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "ingest/open_mission.h"
 
 namespace joulecast::ingest {
 namespace {

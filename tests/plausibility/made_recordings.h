@@ -9,7 +9,7 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/log_recordings.h"
 #include "tests/support/simulated_missions.h"
 

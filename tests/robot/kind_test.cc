@@ -1,7 +1,6 @@
-#include "robot/kind.h"
-
 #include <gtest/gtest.h>
 
+#include "robot/robot_fields.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::robot {

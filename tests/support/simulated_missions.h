@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "client/virtual_robot/truth.h"
-#include "signals/mission_event.h"
 #include "signals/sample.h"
 
 namespace joulecast::virtual_robot {

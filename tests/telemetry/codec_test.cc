@@ -11,9 +11,8 @@
 #include <limits>
 
 #include "samples.h"
-#include "signals/energy_state.h"
 #include "signals/ids.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::telemetry {
 namespace {

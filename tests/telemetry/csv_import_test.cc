@@ -921,8 +921,7 @@ TEST(ImportMapping, ReportsEveryFaultAndWarning) {
   for (const char* pointer : {"/robt_id", "/payload_kg", "/separator"}) EXPECT_THAT(all, HasSubstr(pointer));
   const auto warned = [](const std::string& fields) {
     std::vector<std::string> pointers;
-    for (const MappingFinding& warning : suspicious(mapping_of("", fields)))
-      pointers.push_back(warning.field);
+    for (const FieldFault& warning : suspicious(mapping_of("", fields))) pointers.push_back(warning.field);
     return pointers;
   };
   EXPECT_THAT(warned(R"(, "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"})"),

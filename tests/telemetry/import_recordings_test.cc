@@ -9,7 +9,7 @@
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/csv_table.h"
-#include "telemetry/recording_climb.h"
+#include "telemetry/recording.h"
 #include "telemetry/validation.h"
 #include "temporary_file.h"
 #include "tests/support/import_csv.h"

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "samples.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 
 namespace joulecast::telemetry {
 namespace {

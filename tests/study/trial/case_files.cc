@@ -9,7 +9,7 @@
 
 #include "base/text_file.h"
 #include "client/files.h"
-#include "signals/mission_event.h"
+#include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
 
