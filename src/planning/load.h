@@ -31,6 +31,8 @@ struct WheelLoad {
   double gear = 0;  // signed by the wheel's direction, as dry friction is
   double creep = 0, t_dry = 0, f_dry = 0;
 
+  bool operator==(const WheelLoad&) const = default;
+
   bool quadratic() const { return stribeck == 0 && scrub == 0 && gear == 0 && creep == 0; }
   bool linear() const { return quadratic() && t1 == 0 && t2 == 0 && f2 == 0; }
   // As it is once it does not creep.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -71,7 +72,6 @@ class Request {
       return invalid("end_speed_m_s", "must be 0 where the path ends with a stop or a turn in place");
     }
     Request request(loads, path, problem, stop);
-    request.runs_.reserve(path.runs.size());
     std::size_t nodes = 0;
     for (std::size_t k = 0; k < path.runs.size(); ++k) {
       if (stop.stop_requested()) return stopped();
@@ -81,10 +81,18 @@ class Request {
                     "is " + std::to_string(run.payload_kg) + ", this robot carries at most " +
                         std::to_string(robot.limits.payload_kg));
       }
-      TRY_ASSIGN(auto planner,
-                 RunPlanner::make(robot, loads, run, problem, k == 0 ? problem.start_speed_m_s : 0,
-                                  k + 1 == path.runs.size() ? problem.end_speed_m_s : 0));
+      const double start = k == 0 ? problem.start_speed_m_s : 0,
+                   end = k + 1 == path.runs.size() ? problem.end_speed_m_s : 0;
+      const auto same = std::ranges::find_if(
+          request.runs_, [&](const RunPlanner& earlier) { return earlier.answers(run, start, end); });
+      request.of_run_.push_back(static_cast<std::size_t>(same - request.runs_.begin()));
+      if (same != request.runs_.end()) {
+        request.counts_[request.of_run_.back()] += 1;
+        continue;
+      }
+      TRY_ASSIGN(auto planner, RunPlanner::make(robot, loads, run, problem, start, end));
       request.runs_.push_back(std::move(planner));
+      request.counts_.push_back(1);
       if ((nodes += request.runs_.back().nodes()) > most_nodes) return too_long();
     }
     request.dwell_s_ = path.dwell_s();
@@ -112,7 +120,7 @@ class Request {
   // Of the fastest motion that the limits allow.
   double least_time_s() {
     double sum = dwell_s_;
-    for (RunPlanner& run : runs_) sum += run.shortest_s();
+    for (std::size_t k = 0; k < runs_.size(); ++k) sum += counts_[k] * runs_[k].shortest_s();
     return sum;
   }
 
@@ -248,7 +256,7 @@ class Request {
       Search near = at;
       const double most_w = 30 * std::max(usual_w_, 1e-3);
       near.most = std::max(at.x, std::log(most_w));
-      if (runs_.size() == 1) {
+      if (path_.runs.size() == 1) {
         // Found together with the motion, to the solver's tolerance of the duration.
         TRY_ASSIGN(const double y, roughly_late(at.x));
         const double guess = std::clamp(at.x - y / at.slope, at.least, near.most);
@@ -307,11 +315,11 @@ class Request {
   Result<PlanCost> roughly(double price_w) {
     PlanCost cost{dwell_s_ * loads_.electric().idle_w, dwell_s_};
     std::size_t nodes = 0;
-    for (RunPlanner& run : runs_) {
-      TRY_ASSIGN(const RunAnswer answer, run.solve_roughly(price_w, stop_));
+    for (std::size_t k = 0; k < runs_.size(); ++k) {
+      TRY_ASSIGN(const RunAnswer answer, runs_[k].solve_roughly(price_w, stop_));
       iterations_ += answer.iterations;
-      if ((nodes += run.nodes()) > most_nodes) return too_long();
-      cost.energy_j += answer.energy_j, cost.duration_s += answer.duration_s;
+      if ((nodes += runs_[k].nodes()) > most_nodes) return too_long();
+      cost.energy_j += counts_[k] * answer.energy_j, cost.duration_s += counts_[k] * answer.duration_s;
     }
     return cost;
   }
@@ -320,7 +328,7 @@ class Request {
   // deadline costs less than that sum with the deadline's time at the price above the value of time.
   void bound_by(double deadline) {
     double least_j = cost_j() + (price_w_ - problem_.value_of_time_w) * (duration_s() - deadline);
-    for (const RunAnswer& a : answers_) least_j -= a.gap_j + a.discretisation_j;
+    least_j -= sum_of([](const RunAnswer& a) { return a.gap_j + a.discretisation_j; });
     least_j_ = std::max(least_j_, least_j);
   }
 
@@ -336,16 +344,15 @@ class Request {
     }
   }
 
-  double duration_s() const {
-    double sum = dwell_s_;
-    for (const RunAnswer& a : answers_) sum += a.duration_s;
+  // Over the path's runs.
+  template <class Of>
+  double sum_of(Of&& of) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < answers_.size(); ++k) sum += counts_[k] * std::invoke(of, answers_[k]);
     return sum;
   }
-  double energy_j() const {
-    double sum = dwell_s_ * loads_.electric().idle_w;
-    for (const RunAnswer& a : answers_) sum += a.energy_j;
-    return sum;
-  }
+  double duration_s() const { return dwell_s_ + sum_of(&RunAnswer::duration_s); }
+  double energy_j() const { return dwell_s_ * loads_.electric().idle_w + sum_of(&RunAnswer::energy_j); }
   double cost_j() const { return energy_j() + problem_.value_of_time_w * duration_s(); }
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
@@ -375,7 +382,10 @@ class Request {
   const Path& path_;
   const Problem& problem_;
   std::stop_token stop_;
+  // Runs that are alike, as the straights and turns of a grid, are planned once.
   std::vector<RunPlanner> runs_;
+  std::vector<double> counts_;       // of the path's runs that each answers
+  std::vector<std::size_t> of_run_;  // of each of the path's runs
   std::vector<RunAnswer> answers_;
   struct Kept {
     std::vector<RunAnswer> answers;
@@ -403,8 +413,7 @@ class Writer {
 
   // `at(row, fraction)` is the motion within the cell that begins at `row`; fractions are of its duration.
   template <class At>
-  void run(const RunPlanner& planner, const std::vector<double>& times, At&& at) {
-    const Run& run = planner.run();
+  void run(const Run& run, const std::vector<double>& times, At&& at) {
     uniform_ = loads_.uniform(run);
     if (uniform_) {
       here_ = loads_.instant(run, run.at(0), 1, 1);
@@ -414,21 +423,21 @@ class Writer {
     for (std::size_t k = 0; k < times.size(); ++k) {
       const bool last = k + 1 == times.size();
       const State s = last ? at(k - 1, 1.0) : at(k, 0.0);
-      const dynamics::PowerFlow<double> here = flow(planner, s);
-      row(planner, s, start_s_ + times[k], here.battery_power_w);
+      const dynamics::PowerFlow<double> here = flow(run, s);
+      row(run, s, start_s_ + times[k], here.battery_power_w);
       if (last) break;
       const double span = times[k + 1] - times[k];
       const State next = at(k, 1.0);
       int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
       if (const Electric& e = loads_.electric(); e.up != e.down) {
-        const dynamics::PowerFlow<double> there = flow(planner, next);
+        const dynamics::PowerFlow<double> there = flow(run, next);
         for (const std::size_t side : {0u, 1u})
           parts =
               std::max(parts, parts_of_turn(here.motor_power_w[side], there.motor_power_w[side], e.idle_w));
       }
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
-          add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
+          add(flow(run, at(k, (part + place) / parts)), weight * span / parts);
     }
     if (run.turn == 0) driven_m_ += run.length();
     start_s_ += times.back();
@@ -457,7 +466,7 @@ class Writer {
 
   // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
   // acceleration.
-  dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) {
+  dynamics::PowerFlow<double> flow(const Run& run, const State& s) {
     if (uniform_) {
       for (std::size_t side : {0u, 1u}) {
         here_.wheel_speed_rad_s[side] = pace_[side] * s.speed;
@@ -465,7 +474,6 @@ class Writer {
       }
       return loads_.model().flow(here_);
     }
-    const Run& run = planner.run();
     return loads_.model().flow(loads_.instant(run, just_after(run, s.way), s.speed, s.acceleration));
   }
 
@@ -490,8 +498,7 @@ class Writer {
     }
   }
 
-  void row(const RunPlanner& planner, const State& s, double time_s, double power) {
-    const Run& run = planner.run();
+  void row(const Run& run, const State& s, double time_s, double power) {
     const Knot knot = run.at(s.way);
     if (run.turn != 0) {
       push(time_s, driven_m_, knot.pose, 0, run.turn * s.speed, 0, run.turn * s.acceleration, run.payload_kg,
@@ -537,13 +544,13 @@ Result<Plan> Request::written() {
   Certificate& c = writer.plan().certificate;
   std::array<bool, bound_count> binding{};
   Pose pose;
-  for (std::size_t k = 0; k < runs_.size(); ++k) {
+  for (std::size_t k = 0; k < path_.runs.size(); ++k) {
     if (stop_.stop_requested()) return stopped();
-    const RunPlanner& planner = runs_[k];
-    const Run& run = planner.run();
-    RunAnswer& answer = answers_[k];
+    const Run& run = path_.runs[k];
+    RunPlanner& planner = runs_[of_run_[k]];
+    RunAnswer& answer = answers_[of_run_[k]];
     if (!answer.has_motion()) {
-      TRY_ASSIGN(answer, runs_[k].solve(price_w_, stop_));
+      TRY_ASSIGN(answer, planner.solve(price_w_, stop_));
     }
     writer.plan().run_duration_s.push_back(answer.duration_s);
     writer.dwell(run.dwell_before_s, run.knots.front().pose, run.payload_kg);
@@ -552,7 +559,7 @@ Result<Plan> Request::written() {
     if (answer.line) {
       const LineMotion& line = *answer.line;
       times = line.times(std::max<std::size_t>(8, problem_.intervals_per_run));
-      writer.run(planner, times, [&](std::size_t i, double f) {
+      writer.run(run, times, [&](std::size_t i, double f) {
         const double t = times[i] + f * (times[i + 1] - times[i]);
         const LineState s = line.state(t);
         return Writer::State{s.position, std::max(0.0, s.speed), s.acceleration};
@@ -563,7 +570,7 @@ Result<Plan> Request::written() {
       times.push_back(0);
       for (std::size_t i = 0; i + 1 < way.size(); ++i)
         times.push_back(times.back() + 2 * (way[i + 1] - way[i]) / (speed[i] + speed[i + 1]));
-      writer.run(planner, times, [&](std::size_t i, double f) {
+      writer.run(run, times, [&](std::size_t i, double f) {
         const double span = times[i + 1] - times[i], rate = (speed[i + 1] - speed[i]) / span,
                      v = speed[i] + f * span * rate;
         // A difference over a short span passes the limit by its rounding.

@@ -298,6 +298,35 @@ TEST(Planner, PayloadAndDwellAreCounted) {
   EXPECT_NEAR(both->profile.energy_j.back(), both->summary.energy_j, 1e-9 * both->summary.energy_j);
 }
 
+// Runs that are alike are planned once; each has its own pose and counts.
+TEST(Planner, AlikeRunsCountEach) {
+  std::vector<Segment> there;
+  for (const double turn : {1.5, -1.5, -1.5, 1.5})
+    there.insert(there.end(), {Straight{2}, TurnInPlace{turn}});
+  there.insert(there.end(), {PayloadChange{30}, Straight{2}});
+  for (const std::vector<robot::AdoptedEffect>& effects :
+       {std::vector<robot::AdoptedEffect>{},
+        {{"friction_asymmetry", {{"ratio", 0.5}, {"side", 1}}}},
+        {{"slope", {{"angle_rad", 0.01}, {"uphill_rad", 0.3}}}}}) {
+    robot::RobotModel robot = test::amr();
+    robot.effects = effects;
+    const Path path = *make_path(there, PathOptions{});
+    const auto whole = plan(robot, path, limited(robot, 0));
+    ASSERT_TRUE(whole) << describe(whole.error());
+    double energy_j = 0, duration_s = 0;
+    for (const auto& run : path.runs) {
+      Path one;
+      one.runs = {run};
+      const auto part = plan(robot, one, limited(robot, 0));
+      ASSERT_TRUE(part);
+      energy_j += part->summary.energy_j, duration_s += part->summary.duration_s;
+    }
+    EXPECT_NEAR(whole->summary.energy_j, energy_j, 1e-9 * energy_j);
+    EXPECT_NEAR(whole->summary.duration_s, duration_s, 1e-9 * duration_s);
+    EXPECT_NEAR(whole->profile.y_m.back(), path.runs.back().knots.back().pose.y_m, 1e-9);
+  }
+}
+
 TEST(Planner, AdoptedEffectsChangeTheAnswer) {
   const Path path = made_plan({Straight{3}, TurnInPlace{1.5}, Straight{3}}, 20);
   robot::RobotModel robot = test::amr();
