@@ -408,9 +408,6 @@ class Explainer {
       state_useless_function();
       return false;
     }
-    // A smaller part than that of named effects is only mentioned.
-    const bool smaller = h.function_file - h.function_effects > h.function_effects - h.function_all;
-    if (smaller && surest() >= named) return false;
     return !more_repeats(h.repeats_left);
   }
 
