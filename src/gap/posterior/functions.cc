@@ -185,8 +185,7 @@ Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
 }
 
 // Adds functions of motors and battery, with motor channels.
-void add_motor_functions(const Data& d, const std::map<std::string, Eigen::MatrixXd>& bases,
-                         const Variables& v, std::vector<Function>& out) {
+void add_motor_functions(const Data& d, const Variables& v, std::vector<Function>& out) {
   const robot::Motor& m = d.robot.motor;
   std::array<Eigen::VectorXd, 2> way, amps, turns;
   double per_amp = 0, size = 0;
@@ -209,7 +208,7 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   const Eigen::MatrixXd intervals = v.intervals();
   out.push_back({Channel::bus, "time", {intervals, {}}, d.mean_power_w, false});
   out.push_back({Channel::torque_right, "time", each(intervals, way), torque_unit, false});
-  for (const auto& [name, z] : bases) {
+  for (const auto& [name, z] : v.bases()) {
     out.push_back({Channel::bus, name, {z, {}}, d.mean_power_w});
     out.push_back({Channel::torque_right, name, each(z, way), torque_unit});
   }
@@ -227,23 +226,6 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   out.push_back({Channel::voltage_right, "speed", bends(turns, most_rad_s), voltage_unit});
   out.push_back({Channel::voltage_right, "current", bends(amps, most_a), voltage_unit});
   out.push_back({Channel::voltage_right, "time", each(v.times() / most_a, amps), voltage_unit});
-}
-
-void add_kinematic_functions(const Data& d, const Variables& v, std::vector<Function>& out) {
-  const double r = d.robot.kinematics.wheel_radius_m, l = d.robot.kinematics.half_track_m;
-  const Eigen::ArrayXd forward =
-      v.column([&](const Window& w) { return r * (w.speed_rad_s[0] + w.speed_rad_s[1]) / 2; });
-  const Eigen::ArrayXd yaw =
-      v.column([&](const Window& w) { return r * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * l); });
-  const double fastest = std::max(forward.abs().maxCoeff(), 1e-3),
-               most = std::max(yaw.abs().maxCoeff(), 1e-3);
-  const Eigen::ArrayXd f = forward / fastest, y = yaw / most;
-  Eigen::MatrixXd turning(f.size(), 3), travel(f.size(), 2);
-  turning << y * y.abs(), y * f.abs(), f * f.abs();
-  travel << f * f.abs(), f * y.abs();
-  if (d.motors || d.witness == Witness::kinematics)
-    out.push_back({Channel::gyro, "speed", {turning, {}}, most});
-  out.push_back({Channel::travel, "speed", {travel, {}}, fastest});
 }
 
 }  // namespace
@@ -272,8 +254,7 @@ std::vector<Function> make_functions(const Data& d) {
     if (bends) z.col(1) = 2 * u.square() - 1;
     out.push_back({Channel::power, c.name, {z, {}}, d.mean_power_w});
   }
-  if (!out.empty() || d.witness == Witness::terminals) return out;
-  const Variables of_windows(d, d.windows);
+  if (!out.empty()) return out;
   if (d.at_readings()) {
     for (const auto& [name, z] : Variables(d, d.rows.instants).bases()) {
       const Eigen::MatrixXd of_rows = row_means(d.rows, z);
@@ -282,9 +263,8 @@ std::vector<Function> make_functions(const Data& d) {
           {Channel::power, name, {of_rows.rowwise() - of_rows.colwise().mean(), {}}, d.mean_power_w});
     }
   } else if (d.motors) {
-    add_motor_functions(d, of_windows.bases(), of_windows, out);
+    add_motor_functions(d, Variables(d, d.windows), out);
   }
-  add_kinematic_functions(d, of_windows, out);
   return out;
 }
 

@@ -166,7 +166,6 @@ void add(const Equations& equations, const ChannelRows& rows, const Noise& noise
 
 // The residual of a channel that corresponds to all of the mean power; 0: no such residual.
 double power_unit(const Fit& fit, Channel channel) {
-  if (channel == Channel::gyro || channel == Channel::travel) return 0;
   const auto same = std::ranges::find(fit.functions, channel, &Function::channel);
   return same == fit.functions.end() ? 0 : same->unit;
 }

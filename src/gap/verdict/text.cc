@@ -21,16 +21,13 @@ constexpr double notable_scatter = 0.45;  // of a strength
 constexpr double notable_gap = 0.012;     // of the power, beyond the noise floor
 
 std::string channel_words(std::string_view channel) {
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> words{
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 6> words{
       {{"wheel_torque", "the torque at the wheels"},
        {"motor_voltage", "the voltage of the motors"},
        {"battery_voltage", "the voltage of the battery"},
        {"motor_voltage_from_motion", "the voltage of the motors"},
        {"battery_power_from_motors", "battery power in addition to that of the motors"},
-       {"battery_power_from_motion", "battery power"},
-       {"yaw_rate", "the yaw rate at given wheel speeds"},
-       {"map_travel", "the distance for given turns of the wheels"},
-       {"map_turn", "the rotation for given turns of the wheels"}}};
+       {"battery_power_from_motion", "battery power"}}};
   const auto* found =
       std::ranges::find(words, channel, &std::pair<std::string_view, std::string_view>::first);
   return found == words.end() ? words_of(channel) : std::string(found->second);
