@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <span>
 #include <string_view>
 
 namespace joulecast::gap {
@@ -90,9 +89,8 @@ inline constexpr auto traits_table = std::to_array<Traits>({
 });
 
 constexpr const Traits& traits_of(std::string_view id) {
-  for (const Traits& row : traits_table) {
+  for (const Traits& row : traits_table)
     if (row.id == id) return row;
-  }
   return traits_table.front();  // not reached: every effect has a row
 }
 

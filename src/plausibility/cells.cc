@@ -87,9 +87,8 @@ std::optional<Span> SpanCutter::add(const signals::Sample& sample) {
   if (!first_) return begin(sample), std::nullopt;
   const double step = seconds(last_->utime_us, sample.utime_us);
   if (!(step > 0) || step > longest_span_step_s) return begin(sample), std::nullopt;
-  for (std::size_t k : {0u, 1u}) {
+  for (std::size_t k : {0u, 1u})
     span_.turned_rad[k] += 0.5 * step * (last_->wheel_velocity_rad_s[k] + sample.wheel_velocity_rad_s[k]);
-  }
   span_.gyro_rad += 0.5 * step * (last_->yaw_rate_rad_s + sample.yaw_rate_rad_s);
   const double turn = sample.pose[2] - last_->pose[2];
   span_.heading_rad += std::remainder(turn, 2 * std::numbers::pi);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <set>
 
 #include "plausibility/evaluation.h"
@@ -111,9 +110,8 @@ std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
   const std::size_t most = observations.size() / 2;
   std::vector<Check> found = asked_one_by_one(observations, robot);
   std::vector<Check> in_most;
-  for (const Check& c : found) {
+  for (const Check& c : found)
     if (c.few_missions.size() > most) in_most.push_back(c), in_most.back().few_missions.clear();
-  }
   if (!in_most.empty()) {
     telemetry::RecordingSet others = recordings;
     silence_contradicted(others, in_most);
@@ -162,9 +160,8 @@ double CheckContext::sum(const std::function<double(const Observation&)>& of) co
 }
 
 std::string with_interval(double value, const std::array<double, 2>& interval) {
-  if (!std::isfinite(interval[0]) || interval[1] - interval[0] < 1e-3 * std::fabs(value)) {
+  if (!std::isfinite(interval[0]) || interval[1] - interval[0] < 1e-3 * std::fabs(value))
     return fmt::format("{:.3g}", value);
-  }
   return fmt::format("{:.3g} ({:.3g} to {:.3g})", value, interval[0], interval[1]);
 }
 

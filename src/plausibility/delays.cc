@@ -6,7 +6,7 @@
 
 #include "plausibility/evaluation.h"
 #include "statistics/bootstrap.h"
-#include "statistics/robust.h"
+#include "windows/track.h"
 
 namespace joulecast::plausibility {
 namespace {
@@ -33,14 +33,6 @@ Row row_of(const signals::Sample& s) {
   const auto &w = s.wheel_velocity_rad_s, &v = s.motor_voltage_v, &i = s.motor_current_a;
   const double battery_w = s.battery_voltage_v * s.battery_current_a;
   return {w[0], w[1], v[0] * i[0] + v[1] * i[1], i[0], i[1], battery_w, s.yaw_rate_rad_s, battery_w};
-}
-
-double usual_step_s(const telemetry::Recording& mission) {
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < mission.samples.size(); ++k)
-    steps.push_back(1e-6 *
-                    static_cast<double>(mission.samples[k].utime_us - mission.samples[k - 1].utime_us));
-  return steps.empty() ? 0 : std::max(finest_s, statistics::median(std::move(steps)));
 }
 
 // The readings, interpolated to a uniform grid; NaN in gaps.
@@ -156,7 +148,8 @@ void LagBlock::join(const LagBlock& other, double weight) {
 
 Lags::Lags(std::span<const telemetry::Recording> missions) {
   for (const telemetry::Recording& mission : missions) {
-    const double step_s = usual_step_s(mission);
+    const double step_s =
+        mission.samples.size() < 2 ? 0 : std::max(finest_s, windows::median_period_s(mission));
     if (step_s_ == 0) step_s_ = step_s;
     if (step_s_ > 0 && std::fabs(step_s / step_s_ - 1) <= alike_steps) correlate(mission);
   }

@@ -191,12 +191,11 @@ class Gatherer {
         c_.ratio(Relation::way, 0, 1, 2), anything, 1, {{wheel, 1}}, {.both_sides = true});
     const std::array driven{c_.coefficient(Relation::command, 0, {2, 3}),
                             c_.coefficient(Relation::command, 1, {2, 3})};
-    for (std::size_t k : {0u, 1u}) {
+    for (std::size_t k : {0u, 1u})
       add(std::string("the ") + side_name[k] + " wheel drives at", "the commanded speed", driven[k],
           command_off, trust_of_sides(driven, 5),
           {{wheel + k, 1}, {half_radius, 1}, {double_radius, 1}, {command_speed, -1}},
           {.property = P::following});
-    }
     const Estimate turned = c_.coefficient(Relation::command_turn, 0, {1});
     const bool surely = std::fabs(std::log(std::fabs(turned.value))) < track &&
                         turned.sd < alike_sides * std::fabs(turned.value);

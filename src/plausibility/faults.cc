@@ -147,9 +147,8 @@ std::string also(const std::vector<const ChannelFault*>& alternatives, const Mea
     text += (text.empty() ? "; other explanations: " : ", ") + what;
   };
   for (const ChannelFault* f : alternatives) add(f->channel + " " + f->cause);
-  if (measured.by_gear && measured.factor > 0) {
+  if (measured.by_gear && measured.factor > 0)
     add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
-  }
   if (measured.by_power && measured.factor > 0)
     add(fmt::format("a robot file with {:.3g} times the robot's powers", 1 / measured.factor));
   return text;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <utility>
 
 #include "statistics/distributions.h"
 #include "statistics/robust.h"

@@ -32,9 +32,8 @@ class MeanSizes {
 
 // Mean |residual| of a channel; NaN: the channel has no rows.
 double rest_of(const posterior::Fit& fit, Channel channel) {
-  for (std::size_t c = 0; c < fit.noise.size(); ++c) {
+  for (std::size_t c = 0; c < fit.noise.size(); ++c)
     if (fit.equations.channels[c].channel == channel) return fit.noise[c].rest;
-  }
   return missing;
 }
 

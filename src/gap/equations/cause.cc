@@ -22,9 +22,8 @@ std::vector<Modulation> modulations_of(std::span<const Window> windows) {
   const std::size_t count = windows.empty() ? 0 : windows.front().covariates.size();
   for (std::size_t k = 0; k < count; ++k) {
     std::vector<double> known;
-    for (const Window& w : windows) {
+    for (const Window& w : windows)
       if (std::isfinite(w.covariates[k])) known.push_back(w.covariates[k]);
-    }
     if (2 * known.size() < windows.size()) continue;
     if (std::ranges::min(known) == std::ranges::max(known)) continue;
     modulations.push_back({k, centre_of(std::move(known))});

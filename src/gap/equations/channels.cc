@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <vector>
 
 namespace joulecast::gap {
@@ -21,9 +20,8 @@ std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
   while (k + 2 < grid.size() && grid[k + 1] < tau) ++k;
   const double part = std::log(tau / grid[k]) / std::log(grid[k + 1] / grid[k]);
   std::array<double, 2> heat{};
-  for (std::size_t s : {0u, 1u}) {
+  for (std::size_t s : {0u, 1u})
     heat[s] = (1 - part) * w.copper_heat_w[k][s] + part * w.copper_heat_w[k + 1][s];
-  }
   return heat;
 }
 
@@ -110,11 +108,10 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
     }
     const auto flow = model.flow(nodes.at[n]);
     battery += flow.battery_power_w * nodes.weight[n];
-    for (std::size_t s : {0u, 1u}) {
+    for (std::size_t s : {0u, 1u})
       motor[s] += ((S(1) + p.motor_voltage.gain) * flow.voltage_v[s] + p.motor_voltage.bias) *
                   ((S(1) + p.motor_current.gain) * flow.current_a[s] + p.motor_current.bias) *
                   nodes.weight[n];
-    }
   }
   battery = model.metered_battery_power(battery, w.mission_voltage_v) -
             (p.sensor_delay_s - w.electrical_shift_s) *
@@ -152,15 +149,13 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
     const S voltage =
         model.voltage_for(s, current, at) +
         p.brush_drop_v * (S(w.current_sign[s]) - dynamics::smooth_sign(current, dynamics::brush_width_a));
-    if (!w.motors_apart && (w.resting[s] || std::fabs(w.current_sign[s]) > clear_sign)) {
+    if (!w.motors_apart && (w.resting[s] || std::fabs(w.current_sign[s]) > clear_sign))
       r[index_of(Channel::voltage_right) + s] = w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -
                                                 (S(1) + p.motor_voltage.gain) * voltage -
                                                 p.motor_voltage.bias;
-    }
-    if (w.moving[s] && !w.motors_apart) {
+    if (w.moving[s] && !w.motors_apart)
       r[index_of(Channel::torque_right) + s] =
           reading - (S(1) + p.motor_current.gain) * model.current_for(torque_nm[s]) - p.motor_current.bias;
-    }
     if (no_currents && !w.motors_apart && (w.moving[s] || w.resting[s])) {
       const S asked = w.resting[s] ? S(0) : model.voltage_for(s, model.current_for(torque_nm[s]), at);
       r[index_of(Channel::drive_right) + s] = w.voltage_v[s] + delay * w.voltage_slope_v_s[s] -

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "base/try.h"
@@ -13,11 +12,10 @@ namespace {
 constexpr std::size_t min_group_windows = 20;  // of a group
 
 void add_limits(const posterior::Data& d, Comparison& c) {
-  if (!d.power) {
+  if (!d.power)
     c.limits.emplace_back(
         "Neither battery nor motor power was recorded: the cost of the differences in watts, and all losses "
         "between battery and motors, are undetermined.");
-  }
   if (!d.motors)
     c.limits.emplace_back("Without the motors' currents friction, motors and drivers share one equation.");
   c.limits.emplace_back(

@@ -22,9 +22,8 @@ void silence_names_of_groups(posterior::Data& d) {
     std::vector<std::set<double>> values(1 + *std::ranges::max_element(d.group));
     const auto each = [&](auto&& what) {
       for (std::vector<Window>* windows : {&d.windows, &d.rows.instants}) {
-        for (Window& w : *windows) {
+        for (Window& w : *windows)
           if (c < w.covariates.size()) what(w.covariates[c], d.group[w.mission]);
-        }
       }
     };
     each([&](double value, std::size_t group) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace joulecast::gap {
 namespace {
@@ -52,9 +51,8 @@ class Contraster {
     std::vector<double>& share = made_.contrasts.share;
     share.assign(1 + *std::ranges::max_element(group_), 0);
     double all = 0;
-    for (const ChannelRows& rows : e_.channels) {
+    for (const ChannelRows& rows : e_.channels)
       for (const std::size_t mission : rows.mission) share[group_[mission]] += 1, all += 1;
-    }
     for (double& s : share) s /= all;
   }
 

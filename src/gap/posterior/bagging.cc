@@ -93,9 +93,7 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
   }
   const auto likelier = [](const auto& a, const auto& b) { return a.second < b.second; };
   const auto function = std::ranges::max_element(of_function, likelier);
-  if (function != of_function.end()) {
-    out.function = function->first;
-  }
+  if (function != of_function.end()) out.function = function->first;
   auto set = std::ranges::max_element(of_set, likelier);
   if (set->first.empty() && out.none < named && out.outside < named) {
     std::erase_if(of_set, [](const auto& s) { return s.first.empty(); });
@@ -111,9 +109,8 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
     for (std::size_t k = 0; k < content.size(); ++k) {
       const auto& ids = content[k].ids;
       if (std::ranges::find(ids, id) == ids.end()) {
-        for (const std::string& other : ids) {
+        for (const std::string& other : ids)
           if (std::ranges::find(set->first, other) == set->first.end()) instead[other] += probability[ix(k)];
-        }
       } else if (probability[ix(k)] > most) {
         most = probability[ix(k)];
         found.model = k;

@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "base/try.h"
-#include "gap/equations/channels.h"
-#include "gap/posterior/constants.h"
 #include "statistics/updates.h"
 #include "windows/track.h"
 

@@ -119,9 +119,8 @@ class Builder {
       if (d_.motors)
         motor_share_[ix(k)] = size / (static_cast<double>(std::max<std::size_t>(rows.size(), 1)) * motors_w);
     }
-    for (std::size_t k = 0; k < e_.effects; ++k) {
+    for (std::size_t k = 0; k < e_.effects; ++k)
       if (point_by(k)) e_.modelled_w += e_.point[ix(k)] * e_.moved.col(ix(k));
-    }
     e_.share = d_.power ? Eigen::VectorXd(e_.moved.cwiseAbs().colwise().mean().transpose() / d_.mean_power_w)
                         : share_without_power();
   }
@@ -335,12 +334,10 @@ class Builder {
   // Keeps a channel with enough rows, and its columns that are not zero.
   void keep(ChannelRows rows, const Eigen::MatrixXd& x) {
     if (ux(rows.y.size()) < d_.fewest || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
-    for (std::size_t k = 0; k < e_.effects; ++k) {
+    for (std::size_t k = 0; k < e_.effects; ++k)
       if (!c_.columns[k].by) rows.y += e_.point[ix(k)] * x.col(ix(k));
-    }
-    for (Eigen::Index k = 0; k < x.cols(); ++k) {
+    for (Eigen::Index k = 0; k < x.cols(); ++k)
       if (x.col(k).cwiseAbs().maxCoeff() > 0) rows.columns.push_back(k);
-    }
     rows.x = x(Eigen::all, rows.columns);
     e_.channels.push_back(std::move(rows));
   }

@@ -56,9 +56,8 @@ std::vector<Scored> search(const Prior& prior, const View& view, std::optional<s
   const std::array one{usual_slab};
   const std::span<const double> shares = configuration ? std::span<const double>(one) : slab_shares;
   for (std::size_t i = 0; i < live.size(); ++i) {
-    for (std::size_t j = i + 1; j < live.size(); ++j) {
+    for (std::size_t j = i + 1; j < live.size(); ++j)
       if (!prior.excludes(live[i], live[j])) best.push_back(score({live[i], live[j]}, shares));
-    }
   }
   keep_best(best, kept_pairs);
   all.insert(all.end(), best.begin(), best.end());
@@ -84,9 +83,8 @@ void add_subsets(const Model& model, std::set<std::pair<Set, std::optional<std::
                  std::vector<Model>& models) {
   for (std::size_t bits = 0; bits + 1 < (std::size_t{1} << model.set.size()); ++bits) {
     Model part{{}, model.configuration};
-    for (std::size_t k = 0; k < model.set.size(); ++k) {
+    for (std::size_t k = 0; k < model.set.size(); ++k)
       if ((bits >> k & 1) != 0) part.set.push_back(model.set[k]);
-    }
     if (have.insert({part.set, part.configuration}).second) models.push_back(std::move(part));
   }
 }
@@ -105,10 +103,9 @@ SetEvidence evidence_of(const Eigen::MatrixXd& g, const Eigen::VectorXd& b, cons
   out.mean = z.cwiseProduct(sd);
   out.sd = inverse.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseProduct(sd);
   out.log_evidence = 0.5 * z.dot(c) - factor.matrixLLT().diagonal().array().log().sum();
-  for (Eigen::Index k = 0; k < n; ++k) {
+  for (Eigen::Index k = 0; k < n; ++k)
     out.log_evidence += statistics::log_normal_within(out.mean[k], out.sd[k], least[k], most[k]) -
                         statistics::log_normal_within(0, sd[k], least[k], most[k]);
-  }
   return out;
 }
 
@@ -125,9 +122,8 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
                                                                         : 1;
     log_prior_.push_back(std::log(expected_effects / static_cast<double>(ids) / shapes[id] / against));
   }
-  for (std::size_t f = 0; f < functions.size(); ++f) {
+  for (std::size_t f = 0; f < functions.size(); ++f)
     for (const double share : function_shares) configurations_.push_back({f, share});
-  }
   if (!configurations_.empty())
     log_configuration_ = std::log(expected_function / static_cast<double>(configurations_.size()));
   excludes_.assign(size() * size(), false);
@@ -291,9 +287,8 @@ std::vector<Model> enumerate(const Prior& prior, const Reduced& reduced) {
   std::vector<Ranked> found;
   double to_beat = 0;
   const auto add = [&](std::optional<std::size_t> configuration) {
-    for (Scored& s : search(prior, view, configuration, live, to_beat)) {
+    for (Scored& s : search(prior, view, configuration, live, to_beat))
       found.push_back({s.log_joint, {std::move(s.set), configuration}});
-    }
   };
   add(std::nullopt);
   for (const Ranked& f : found) to_beat = std::max(to_beat, f.model.set.size() <= 1 ? f.log_joint : 0.0);

@@ -127,9 +127,8 @@ class Explainer {
 
   // The posterior given that no function is present.
   Eigen::VectorXd without_functions(Eigen::VectorXd p) const {
-    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
+    for (std::size_t k = 0; k < fit_.models.size(); ++k)
       if (fit_.models[k].configuration) p[ix(k)] = 0;
-    }
     return p / std::max(p.sum(), 1e-300);
   }
 
@@ -285,9 +284,8 @@ class Explainer {
       const Step step = damped_step(fit_, strengths, fit_.once());
       if (missed(fit_, strengths) > step.missed + clear_gain) strengths = step.strengths;
     }
-    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
+    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k)
       if (at_bound_at(strengths, k)) strengths[ix(k)] = 0;
-    }
     if (fit_.data.at_readings()) move_to_file(strengths);
     if (fit_.data.power) {
       const Eigen::VectorXd measured = fit_.data.rows.measured_w();

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 
-#include "gap/posterior/bagging.h"
 #include "gap/posterior/terms.h"
 #include "statistics/bootstrap.h"
 #include "statistics/regression.h"
@@ -40,9 +39,8 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
   };
   const auto mean = [&](const auto& admits) {
     double most = -std::numeric_limits<double>::infinity(), total = 0;
-    for (std::size_t k = 0; k < fit.models.size(); ++k) {
+    for (std::size_t k = 0; k < fit.models.size(); ++k)
       if (admits(fit.models[k])) most = std::max(most, log_joint[ix(k)]);
-    }
     Eigen::VectorXd own = Eigen::VectorXd::Zero(n);
     for (std::size_t k = 0; k < fit.models.size(); ++k) {
       const Model& m = fit.models[k];
@@ -81,9 +79,8 @@ Eigen::VectorXd regressed(const Data& d, const TermColumns& terms, std::span<con
   const std::vector<std::size_t> of_row = d.rows.blocks();
   std::vector<Eigen::Index> trained;
   std::vector<std::size_t> block;
-  for (std::size_t r = 0; r < of_row.size(); ++r) {
+  for (std::size_t r = 0; r < of_row.size(); ++r)
     if (weights[of_row[r]] != 0) trained.push_back(ix(r)), block.push_back(of_row[r]);
-  }
   const Eigen::VectorXd measured = d.rows.measured_w();
   Eigen::MatrixXd x = terms.x(trained, Eigen::all);
   // A term that these rows contain by rounding alone has no coefficient.
@@ -220,15 +217,13 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     const Predictors p = predictors(fit, weights, effects, with_functions);
     for (std::size_t c = 0; c < e.channels.size(); ++c) {
       std::vector<Eigen::Index> own;
-      for (std::size_t row = 0; row < e.channels[c].block.size(); ++row) {
+      for (std::size_t row = 0; row < e.channels[c].block.size(); ++row)
         if (fold_of(e.channels[c].block[row]) == k) own.push_back(ix(row));
-      }
       if (fit.noise[c].sigma > 0 && !own.empty()) add(e, e.channels[c], fit.noise[c], own, p, errors[c]);
     }
     std::vector<Eigen::Index> tested;
-    for (std::size_t r = 0; r < n; ++r) {
+    for (std::size_t r = 0; r < n; ++r)
       if (fold_of(d.rows.window(r).block) == k) tested.push_back(ix(r));
-    }
     if (tested.empty()) continue;
     const Eigen::VectorXd power_w = explained_power(fit, p, weights);
     out.explained_w(tested) = power_w(tested);

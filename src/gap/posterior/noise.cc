@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "gap/posterior/constants.h"
 #include "statistics/regression.h"
@@ -20,9 +19,8 @@ Eigen::VectorXd ridge_deviations(const ChannelRows& rows, const Equations& e,
     const double unit = c.usual > 0 ? std::min(c.unit, c.usual / likely_share) : c.unit;
     sd[ix(k)] = std::max({c.tolerance, c.scatter, likely_share * unit});
   }
-  for (std::size_t f = 0; f < functions.size(); ++f) {
+  for (std::size_t f = 0; f < functions.size(); ++f)
     for (const std::size_t k : e.function_columns[f]) sd[ix(k)] = functions[f].for_noise ? sd[ix(k)] : 0;
-  }
   return sd(rows.columns);
 }
 
@@ -45,10 +43,9 @@ Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual
   for (Eigen::Index k = 0; k < residual.size(); ++k) (rows.resting[ux(k)] ? classes[0] : moving).push_back(k);
   std::ranges::stable_sort(moving, {}, [&](Eigen::Index k) { return std::fabs(rows.y[k] - residual[k]); });
   const std::size_t many = std::clamp<std::size_t>(moving.size() / (2 * fewest_of_class), 1, size_classes);
-  for (std::size_t g = 0; g < many; ++g) {
+  for (std::size_t g = 0; g < many; ++g)
     classes.emplace_back(moving.begin() + static_cast<std::ptrdiff_t>(g * moving.size() / many),
                          moving.begin() + static_cast<std::ptrdiff_t>((g + 1) * moving.size() / many));
-  }
   std::vector<double> found;
   double most = 0;
   for (const auto& own : classes) {
@@ -89,9 +86,8 @@ Noise learn_noise(const ChannelRows& rows, const Equations& e, const std::vector
   const bool by_squares = rows.channel == Channel::power;
   const Eigen::VectorXd sd = ridge_deviations(rows, e, functions);
   std::vector<Eigen::Index> used;
-  for (Eigen::Index k = 0; k < sd.size(); ++k) {
+  for (Eigen::Index k = 0; k < sd.size(); ++k)
     if (sd[k] > 0) used.push_back(k);
-  }
   const Eigen::MatrixXd x = rows.x(Eigen::all, used) * sd(used).asDiagonal();
   const double n = static_cast<double>(rows.y.size()), size = std::sqrt(rows.y.squaredNorm() / n);
   Eigen::VectorXd weight = Eigen::VectorXd::Constant(rows.y.size(), 1 / (size * size)), residual, spread;

@@ -97,9 +97,8 @@ class TermTable {
       double least = joined_deviation;
       std::array<std::size_t, 2> join{};
       for (std::size_t a = 0; a < out.size(); ++a) {
-        for (std::size_t b = a + 1; b < out.size(); ++b) {
+        for (std::size_t b = a + 1; b < out.size(); ++b)
           if (const double r = distinct(out[a], out[b]); r < least) least = r, join = {a, b};
-        }
       }
       if (join[1] == 0) break;
       out[join[0]].insert(out[join[0]].end(), out[join[1]].begin(), out[join[1]].end());

@@ -10,9 +10,8 @@ namespace {
 
 Eigen::VectorXd joined(const Fit& fit, const Parts& parts) {
   Eigen::VectorXd all = parts.strengths.head(ix(fit.equations.effects));
-  for (std::size_t k = 0; k < fit.equations.effects; ++k) {
+  for (std::size_t k = 0; k < fit.equations.effects; ++k)
     if (fit.equations.columns[k].of_file) all[ix(k)] += parts.calibration[ix(k)];
-  }
   return bounded(fit.catalogue, std::move(all));
 }
 
@@ -26,9 +25,8 @@ double power_share(const Fit& fit, const Eigen::VectorXd& of_columns) {
 double sensor_delay_s(const Fit& fit) {
   const std::size_t best = likeliest(fit);
   const std::vector<std::size_t>& set = fit.models[best].set;
-  for (std::size_t k = 0; k < set.size(); ++k) {
+  for (std::size_t k = 0; k < set.size(); ++k)
     if (fit.catalogue.hypotheses[set[k]].id() == "sensor_delay") return fit.strengths[best].mean[ix(k)];
-  }
   return 0;
 }
 
@@ -62,9 +60,8 @@ Eigen::VectorXd calibration(const Equations& e, const Information& blocks, doubl
                             const Eigen::VectorXd& coefficients) {
   const Eigen::VectorXd all = tolerances(e, factor);
   std::vector<Eigen::Index> own;
-  for (Eigen::Index k = 0; k < all.size(); ++k) {
+  for (Eigen::Index k = 0; k < all.size(); ++k)
     if (all[k] > 0) own.push_back(k);
-  }
   const Eigen::VectorXd sd = all(own);
   Eigen::MatrixXd m = sd.asDiagonal() * blocks.xx(own, own) * sd.asDiagonal();
   m.diagonal().array() += 1;

@@ -139,11 +139,10 @@ class RunDiagnoser {
       by_table[run.table].insert(run.at.payload_kg);
     }
     if (by_table.size() > 1 && payloads.size() > 1 &&
-        std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; })) {
+        std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; }))
       limits.emplace_back(
           "The payload changes only from table to table: other differences between tables of more than 2 % "
           "count as payload.");
-    }
     if (payloads.size() == 2) {
       limits.emplace_back(
           "Two payloads do not show whether an effect is proportional to the payload: a third one is "
@@ -151,18 +150,16 @@ class RunDiagnoser {
     } else if (payloads.size() == 1) {
       limits.emplace_back("One payload: effects that depend on the load cannot be detected.");
     }
-    if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
+    if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3)
       limits.push_back(fmt::format(
           "Speeds within a factor of {:.1f}: dry and viscous friction and drag are barely distinguishable.",
           range));
-    }
-    if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
+    if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1)
       limits.push_back(fmt::format(
           "The given model energies are {:.2f} times those of the robot file under the stated "
           "conditions: one of the two is wrong, for example the distances. Strengths are computed with "
           "the stated conditions; those of friction are inversely proportional to the distance.",
           r_.model_ratio));
-    }
     for (const DiagnosedEffect& e : r_.diagnosis.effects) {
       const auto stands_for = [&](std::string_view id) {
         return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();

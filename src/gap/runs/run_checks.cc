@@ -48,9 +48,8 @@ std::optional<Check> other_unit(const RunRows& rows, const std::string& column) 
   const Eigen::VectorXd measured = d.rows.measured_w();
   const double smaller = per_m(posterior::predicted_power(d, d.in_file)) / per_m(measured);
   std::string unit = "Wh or kJ";
-  for (const auto& [name, in_j] : units) {
+  for (const auto& [name, in_j] : units)
     if (smaller < near * in_j && smaller > in_j / near) unit = name;
-  }
   std::vector<double> ratio;
   for (std::size_t k = 0; k < e.measured.size(); ++k) ratio.push_back(e.measured[k] / e.modelled[k]);
   const double usual = statistics::median(std::move(ratio));
@@ -86,9 +85,8 @@ RunChecks outliers(const RunRows& rows, const std::string& column) {
   if (rows.runs().size() < fewest) return found;
   const auto [usual, apart] = rows.regression();
   std::vector<std::size_t>& far = found.apart;
-  for (std::size_t k = 0; k < apart.size(); ++k) {
+  for (std::size_t k = 0; k < apart.size(); ++k)
     if (std::fabs(apart[k]) > gross) far.push_back(k);
-  }
   // A deviation of a tenth or more of the runs is systematic.
   if (10 * far.size() >= apart.size()) return {};
   std::ranges::sort(far, {}, [&, &by = apart](std::size_t k) { return -std::fabs(by[k]); });
@@ -123,9 +121,8 @@ std::optional<Check> overload(const RunRows& rows, double limit_kg) {
 
 RunChecks check_runs(const RunRows& rows, const robot::RobotModel& robot) {
   const std::string column = rows.by_motor() ? "right_j, left_j" : "energy_j";
-  for (const auto check : {other_unit, constant}) {
+  for (const auto check : {other_unit, constant})
     if (auto found = check(rows, column)) return {{std::move(*found)}, {}};
-  }
   RunChecks found = outliers(rows, column);
   if (auto over = overload(rows, robot.limits.payload_kg)) found.checks.push_back(std::move(*over));
   return found;

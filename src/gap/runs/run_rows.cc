@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <set>
 
 #include "gap/posterior/hold_out.h"
@@ -29,14 +28,12 @@ void fill_covariates(std::vector<MissionRun>& runs, std::size_t count) {
   for (MissionRun& run : runs) run.covariates.resize(count, MissionRun::absent);
   for (std::size_t c = 0; c < count; ++c) {
     std::vector<double> known;
-    for (const MissionRun& run : runs) {
+    for (const MissionRun& run : runs)
       if (std::isfinite(run.covariates[c])) known.push_back(run.covariates[c]);
-    }
     if (known.empty()) continue;
     const double middle = statistics::median(std::move(known));
-    for (MissionRun& run : runs) {
+    for (MissionRun& run : runs)
       if (!std::isfinite(run.covariates[c])) run.covariates[c] = middle;
-    }
   }
 }
 
@@ -144,9 +141,8 @@ RunRows::RunRows(const RunSet& set, const robot::RobotModel& robot,
     shifts.try_emplace(run.table, Eigen::VectorXd::Zero(ix(runs_.size()))).first->second[ix(k)] =
         d.mean_power_w;
   }
-  for (auto& [table, shift] : shifts) {
+  for (auto& [table, shift] : shifts)
     if (shifts.size() > 1) d.shifts.push_back(std::move(shift));
-  }
   for (std::size_t c = 0; c < conditions_of(runs_.front(), 0).size(); ++c) {
     posterior::Condition condition{conditions_of(runs_.front(), 0)[c].first,
                                    Eigen::VectorXd(ix(runs_.size()))};
@@ -186,9 +182,8 @@ void RunRows::silence(const std::vector<std::size_t>& runs) {
     joule_[k] /= silent;
     for (Eigen::VectorXd& shift : data_.shifts) shift[ix(k)] *= silent;
     for (posterior::PowerRows* rows : {&data_.rows, &data_.sides}) {
-      for (std::size_t r = 0; r < rows->size(); ++r) {
+      for (std::size_t r = 0; r < rows->size(); ++r)
         if (rows->window(r).mission == k) rows->scale[r] *= silent, rows->power_w[r] *= silent;
-      }
     }
   }
 }

@@ -210,10 +210,9 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
     }
     const auto found =
         std::ranges::find(run_table_columns, name, [](const Column& column) { return column.about.name; });
-    if (found == run_table_columns.end()) {
+    if (found == run_table_columns.end())
       return invalid(where, "column " + names[c] + " is none of a table of runs; covariate:" + names[c] +
                                 " or label:" + names[c] + " would make it a possible cause");
-    }
     header.at[static_cast<std::size_t>(found - run_table_columns.begin())] = c;
   }
   for (std::size_t k = 0; k < place_count; ++k) {
@@ -269,13 +268,10 @@ Result<std::vector<std::string>> RunSet::groups_by(std::string_view label) const
 
 Result<RunSet> read_runs(std::span<const RunFile> files, const robot::RobotModel& robot) {
   RunSet set;
-  for (const RunFile& file : files) {
-    TRY(read_file(file, robot, files.size() > 1, set));
-  }
-  if (set.runs.size() < fewest_runs) {
+  for (const RunFile& file : files) TRY(read_file(file, robot, files.size() > 1, set));
+  if (set.runs.size() < fewest_runs)
     return invalid(files.front().name, "holds " + std::to_string(set.runs.size()) + " runs, at least " +
                                            std::to_string(fewest_runs) + " are needed");
-  }
   for (MissionRun& run : set.runs) {
     run.covariates.resize(set.covariates.size(), MissionRun::absent);
     run.labels.resize(set.labels.size());

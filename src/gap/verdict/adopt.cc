@@ -55,9 +55,8 @@ std::optional<Change> change_of(const dynamics::ActiveEffect& effect, const Json
   const auto& parameters = effect.effect->info().parameters;
   Change change{std::string(traits.calibrates), traits.adds ? 0 : effect.values[0],
                 traits.adds ? effect.values[0] : 0};
-  for (std::size_t k = 1; k < parameters.size(); ++k) {
+  for (std::size_t k = 1; k < parameters.size(); ++k)
     if (parameters[k].strength) change.plus += effect.values[k];
-  }
   Json changed = file;
   change_number(changed[Json::json_pointer(change.pointer)], change);
   return robot::parse_robot(changed.dump()) ? std::optional(std::move(change)) : std::nullopt;
@@ -99,17 +98,15 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
     const auto other =
         std::ranges::find(offered.instead, named.empty() ? "" : named.front(), &AdoptedEffect::id);
     chosen.push_back(other == offered.instead.end() ? offered.effect : *other);
-    if (chosen.back().parameters.empty()) {
+    if (chosen.back().parameters.empty())
       return fail(Fault::conflict, "effect",
                   fmt::format("the diagnosis has no strength of {}: only {} can be adopted", chosen.back().id,
                               offered.effect.id));
-    }
   }
   if (unused.empty()) return chosen;
   std::vector<std::string> known;
-  for (const OfferedEffect& offered : offer.effects) {
+  for (const OfferedEffect& offered : offer.effects)
     for (std::string& id : ids_of(offered)) known.push_back(std::move(id));
-  }
   return invalid("effect",
                  fmt::format("{} is not among what was found: {}", *unused.begin(), enumerate(known)));
 }
@@ -128,10 +125,9 @@ Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const 
       const double a = std::fabs(had.values[0]), b = std::fabs(more.values[0]);
       const double weight = a + b > 0 ? b / (a + b) : 0;
       const auto& parameters = more.effect->info().parameters;
-      for (std::size_t k = 0; k < parameters.size(); ++k) {
+      for (std::size_t k = 0; k < parameters.size(); ++k)
         more.values[k] = k == 0 || parameters[k].strength ? had.values[k] + more.values[k]
                                                           : std::lerp(had.values[k], more.values[k], weight);
-      }
       *present = dynamics::adopt(more);
     }
     TRY(dynamics::activate(*present));

@@ -118,9 +118,8 @@ std::vector<Window> driven(const robot::RobotModel& robot, const std::vector<Leg
 // Columns of effects and nuisances: manoeuvres have no functions.
 std::vector<Eigen::Index> without_functions(const posterior::Equations& e) {
   std::vector<Eigen::Index> keep;
-  for (std::size_t k = 0; k < e.size(); ++k) {
+  for (std::size_t k = 0; k < e.size(); ++k)
     if (k < e.effects || k >= e.effects + e.functions) keep.push_back(posterior::ix(k));
-  }
   return keep;
 }
 

@@ -186,10 +186,9 @@ class Collector {
   // The interval in which the model's power error is largest.
   void power(Figures& figures, const telemetry::RecordingSet& recordings) const {
     std::map<std::pair<std::size_t, int>, double> halves;
-    for (std::size_t k = 0; k < windows_.size(); ++k) {
+    for (std::size_t k = 0; k < windows_.size(); ++k)
       halves[{windows_[k].mission, static_cast<int>(windows_[k].t_s / (stretch_s / 2))}] +=
           std::fabs(measured_[k] - before_[k]);
-    }
     if (halves.empty()) return;
     std::pair<std::size_t, int> worst = halves.begin()->first;
     double most = -1;

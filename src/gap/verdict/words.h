@@ -3,7 +3,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 // Formats numbers, ids and lists for people.
 namespace joulecast::gap {
