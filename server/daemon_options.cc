@@ -37,7 +37,10 @@ DaemonOptions::DaemonOptions() {
   mqtt.broker.client_id = mqtt.interface = "joulecast";
   mqtt.manufacturer = "unknown";
   mqtt.now_utime_us = host_utime_us;
-  mqtt.note = [](const std::string& text) { log_info(text, {}); };
+  mqtt.on_change = [](const std::string& why) {
+    why.empty() ? log_info("the MQTT broker is connected")
+                : log_warning("the MQTT broker is not connected", {{"cause", why}});
+  };
 }
 
 std::string store_url(const DaemonOptions& options) {

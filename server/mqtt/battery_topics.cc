@@ -112,8 +112,7 @@ void BatteryTopics::on_change(const std::string& why) {
     greet_ |= why.empty();
   }
   if (why.empty()) ++connections_;
-  if (is_new)
-    options_.note(why.empty() ? "the MQTT broker is connected" : "the MQTT broker is not connected: " + why);
+  if (is_new) options_.on_change(why);
   wake_.notify_all();
 }
 
@@ -165,6 +164,9 @@ Result<void> BrokerLink::start() {
       handle_, [](mosquitto*, void* self, int code) { static_cast<BrokerLink*>(self)->on_connect(code); });
   mosquitto_publish_callback_set(handle_, [](mosquitto*, void* self, int message) {
     static_cast<BrokerLink*>(self)->on_acknowledged(message);
+  });
+  mosquitto_log_callback_set(handle_, [](mosquitto*, void* self, int level, const char* text) {
+    if (level == MOSQ_LOG_ERR) static_cast<BrokerLink*>(self)->fault_ = text;
   });
   TRY(done(mosquitto_threaded_set(handle_, true), "mqtt.url"));
   if (options_.tls) TRY(set_tls());
@@ -232,7 +234,8 @@ void BrokerLink::run(int code) {
     wake_.notify_all();
     if (leave_until_) return;
     lock.unlock();
-    tell(mosquitto_strerror(code));
+    const std::string fault = std::exchange(fault_, {});
+    tell(fault.empty() ? mosquitto_strerror(code) : fault.c_str());
     lock.lock();
     if (wake_.wait_for(lock, pause, [this] { return leave_until_.has_value(); })) return;
     lock.unlock();

@@ -64,6 +64,7 @@ class BrokerLink {
   mosquitto* handle_ = nullptr;
   std::atomic<bool> connected_ = false;
   std::thread thread_;
+  std::string fault_;  // of TLS, as the library logs it; of the thread
   std::mutex mutex_;
   std::condition_variable wake_;
   int awaited_ = 0;       // the last message that requires an acknowledgement
@@ -87,7 +88,8 @@ class BatteryTopics {
     answers::Dialect dialect = answers::Dialect::vda5050_3_0;  // or vda5050_2_1
     std::chrono::milliseconds period{5000};
     std::function<std::int64_t()> now_utime_us = {};
-    std::function<void(const std::string&)> note = {};  // into the log; any thread
+    // As of BrokerLink, but only the first of several failed attempts.
+    std::function<void(const std::string& why)> on_change = {};
   };
   struct Battery {
     std::string robot_id;

@@ -148,6 +148,12 @@ def main():
         wait_until(lambda: broker.heard("joulecast/v2/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"] == "CONNECTIONBROKEN",
                    60, "the broker reports the lost daemon")
 
+        programs.settings = ["--mqtt-url", f"mqtts://localhost:{broker.port}"]  # with the authorities of the system
+        programs.start()
+        log = pathlib.Path(programs.path("daemon.log"))
+        wait_until(lambda: re.search('"warning".*certificate verify failed', log.read_text()), 10, "the log has the cause of a TLS error")
+        programs.stop()
+
         programs.settings = ["--mqtt-url", f"mqtt://localhost:{free_tcp_port()}"]
         programs.start()
         check(programs.stop() == 0, "without a broker the daemon did not stop in order")
