@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "answers/autonomy.h"
+#include "answers/mission.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "base/try.h"
@@ -41,6 +42,7 @@
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
+#include "server/http/text.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 
@@ -201,6 +203,12 @@ struct Application::Parts {
     writing.on_reused_name = [this](const history::Mission& begun, history::MissionKey earlier) {
       ingest::report_reused_name(begun, earlier, host_utime_us(), counters,
                                  [this](history::Command command) { offer(std::move(command)); });
+    };
+    writing.on_mission_ended = [this](const history::Mission& mission) {
+      std::string text = answers::mission_table().text(mission);
+      http::round_numbers(text, http::usual_digits);
+      events.publish("mission", text, mission.robot_id);
+      if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, text);
     };
     writer = std::make_unique<history::Writer>(*store, std::move(writing));
     tell_of_faults();
@@ -559,10 +567,7 @@ struct Application::Parts {
   }
 
   void run_beat(const std::stop_token& stop) {
-    server::FleetEvents fleet_events(
-        *services, recent, events, [this](const history::Mission& mission, const std::string& json) {
-          if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, json);
-        });
+    server::FleetEvents fleet_events(*services, recent, events);
     do {
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
       survive("tokens", [&] { read_tokens(); });

@@ -1,6 +1,5 @@
 #include "server/fleet_events.h"
 
-#include "answers/mission.h"
 #include "server/api/robot_json.h"
 #include "server/http/text.h"
 
@@ -31,14 +30,6 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     recent_.take(*snapshot);
     Published& published = published_[snapshot->robot_id];
     const bool live = api::is_live(*snapshot, now_utime_us);
-    if (published.snapshot != nullptr && published.snapshot->mission_key > 0 &&
-        published.snapshot->mission_key != snapshot->mission_key) {
-      if (const auto mission = services_.store.mission(published.snapshot->mission_key)) {
-        const std::string text = rounded(answers::mission_table().text(*mission));
-        hub_.publish("mission", text, snapshot->robot_id);
-        mission_ended_(*mission, text);
-      }
-    }
     if (published.snapshot == snapshot && published.live == live) continue;
     publish_contradictions(*snapshot, published);
     const auto model = services_.models.find(snapshot->robot_id);

@@ -1,27 +1,21 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
+#include <memory>
 #include <string>
-#include <utility>
 
 #include "server/api/services.h"
 #include "server/http/event_hub.h"
 
 namespace joulecast::server {
 
-// Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot, `mission`
-// for each mission that ended, `contradiction` for each published contradiction. Keeps the last values of
-// each robot. One thread.
+// Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot,
+// `contradiction` for each published contradiction. Keeps the last values of each robot. One thread.
 class FleetEvents {
  public:
-  // Also called with each mission that ended and its JSON.
-  using MissionSink = std::function<void(const history::Mission&, const std::string& json)>;
-
-  FleetEvents(const api::Services& services, ingest::RecentValues& recent, http::EventHub& hub,
-              MissionSink mission_ended)
-      : services_(services), recent_(recent), hub_(hub), mission_ended_(std::move(mission_ended)) {}
+  FleetEvents(const api::Services& services, ingest::RecentValues& recent, http::EventHub& hub)
+      : services_(services), recent_(recent), hub_(hub) {}
 
   void publish(std::int64_t now_utime_us);
 
@@ -36,7 +30,6 @@ class FleetEvents {
   const api::Services& services_;
   ingest::RecentValues& recent_;
   http::EventHub& hub_;
-  const MissionSink mission_ended_;
   std::map<std::string, Published> published_;
 };
 

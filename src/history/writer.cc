@@ -357,6 +357,10 @@ bool Writer::settle(std::vector<Outcome>& outcomes, bool idle, double duration_s
     if (const auto* begun = std::get_if<StartMission>(&batch_.commands[k]);
         begun != nullptr && outcomes[k].value_or(0) > 0 && options_.on_reused_name)
       options_.on_reused_name(begun->mission, *outcomes[k]);
+    if (const auto* last = std::get_if<CheckpointMission>(&batch_.commands[k]);
+        last != nullptr && outcomes[k] && last->mission.state != MissionState::open &&
+        options_.on_mission_ended)
+      options_.on_mission_ended(last->mission);
   }
   bool recovered = false;
   {

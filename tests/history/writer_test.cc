@@ -458,6 +458,26 @@ TEST_F(WriterTest, ReportsEventsOfAChange) {
   EXPECT_EQ(stored(), std::vector<std::int64_t>{7});
 }
 
+TEST_F(WriterTest, ReportsEachEndedMission) {
+  std::vector<Mission> ended;
+  WriterOptions o = options();
+  o.on_mission_ended = [&](const Mission& mission) { ended.push_back(mission); };
+  Mission m = start_mission(store_, "amr-1", "m", 0);
+  Writer writer(store_, o);
+  store_.fails = true;
+  ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, {}, {}}));
+  m.state = MissionState::finished;
+  m.samples = 10;
+  ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, {}, {}}));
+  ASSERT_TRUE(eventually([&] { return writer.status().failed_commits > 0; }));
+  EXPECT_TRUE(ended.empty()) << "not committed yet";
+  store_.fails = false;
+  ASSERT_TRUE(writer.flush());
+  ASSERT_EQ(ended.size(), 1U);
+  EXPECT_EQ(ended[0].key, m.key);
+  EXPECT_EQ(ended[0].samples, 10);
+}
+
 TEST_F(WriterTest, TakesCommandsOfManyThreads) {
   WriterOptions o = options();
   o.batch_commands = 37;
