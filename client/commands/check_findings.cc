@@ -108,6 +108,17 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
                                     "is its unit rad/s at the wheel?",
                                     fastest),
                         fastest});
+  const std::uint64_t samples = tally.sequence.received;
+  std::uint64_t powered = samples;
+  for (const telemetry::FieldTally& field : tally.fields)
+    if (field.name.starts_with("battery_")) powered = std::min(powered, field.measured);
+  if (const std::uint64_t lacking = samples - powered; lacking > 0)
+    findings.push_back(
+        {false, channel, "battery",
+         fmt::format("{} of {} messages lack the battery's voltage or current: their energy is "
+                     "that of the model",
+                     lacking, samples),
+         static_cast<double>(lacking)});
   if (robot_file || fastest <= windows::moving_rad_s) return;
   for (const telemetry::FieldTally& field : tally.fields) {
     const bool is_stated = field.name.starts_with("velocity_command") || field.name.starts_with("payload");

@@ -32,7 +32,8 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
 // Of a robot's recordings against its file: signs, units, dead, held and constant channels.
 void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings);
 
-// For channels alone: wheels that never turn; without a robot file also fields that never change in motion.
+// For channels alone: wheels that never turn, battery power that is not measured; without a robot file also
+// fields that never change in motion.
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, bool robot_file,
                   Findings& findings);
 

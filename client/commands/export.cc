@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 #include <string>
@@ -49,9 +51,9 @@ Result<Exit> write_pages(const ExportOptions& options, const std::string& path, 
   for (bool first = true; !target.empty(); first = false) {
     TRY_ASSIGN(const auto reply, ask(options.server, HttpMethod::get, target, {}, renamed, accept_csv));
     std::string_view text = reply.body;
-    const auto titles = text.find('\n');
-    if (!first) text.remove_prefix(titles == std::string_view::npos ? text.size() : titles + 1);
-    rows += static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
+    const std::string_view lines = text.substr(std::min(text.find('\n'), text.size() - 1) + 1);
+    rows += static_cast<std::uint64_t>(std::ranges::count(lines, '\n'));
+    if (!first) text = lines;
     progress.reach(rows);
     if (file)
       TRY(file->write(text));
@@ -60,6 +62,9 @@ Result<Exit> write_pages(const ExportOptions& options, const std::string& path, 
     target = next_of(reply.link);
   }
   if (file) TRY(file->commit());
+  if (rows < all_rows)
+    fmt::print(stderr, "joulecast: the store has {} of the mission's {} samples: see store.retention_days\n",
+               rows, all_rows);
   return Exit::ok;
 }
 

@@ -66,8 +66,8 @@ void print_tables(const Json& document) {
 // The error with the option that named the store.
 template <class T>
 Result<T> of_option(Result<T> result, const char* option) {
-  if (!result && (result.error().field == "url" || result.error().field == "database"))
-    result.error().field = option;
+  const std::string field = result ? "" : result.error().field;
+  if (field == "url" || field == "database" || field == "to") result.error().field = option;
   return result;
 }
 
@@ -86,7 +86,7 @@ Result<Exit> copy(StoreOptions& options) {
     return Exit::ok;
   }
   print_tables(document);
-  if (copied.rows_found > 0) fmt::print("{} rows are from an earlier, interrupted copy\n", copied.rows_found);
+  if (copied.rows_found > 0) fmt::print("{} rows were there already\n", copied.rows_found);
   fmt::print("every table is equal in both stores\n");
   return Exit::ok;
 }

@@ -34,6 +34,7 @@ def read_history(options, programs):
     programs.run("replay", log, "--into", store, "--robot", robot)
     with sqlite3.connect(store) as rows:
         check(rows.execute("UPDATE mission SET note = ?", ("\x1b[2J\x9b2J",)).rowcount == 3, "missions with a note")
+        rows.execute("DELETE FROM telemetry_chunk WHERE mission_key = 2")  # as the retention does
     rows.close()
     process = subprocess.Popen([options.daemon, "--http-port", "0", "--store-path", store, "--lcm-url", "memq://", "--log-format", "json"],
                                stderr=subprocess.PIPE, text=True)
@@ -61,6 +62,8 @@ def read_history(options, programs):
         check(programs.run("export", name, *server, *of).replace("\r", "").split("\n") == "\n".join(rows).replace("\r", "").split("\n"), f"{name} differs on standard output")
         done = subprocess.run([options.client, "export", name, *server, *of, "--out", out], capture_output=True, text=True)
         check(done.returncode == 1 and "--out" in done.stderr, f"{name} was written over: {done}")
+    done = subprocess.run([options.client, "export", "telemetry", *server, "--mission", "2"], capture_output=True, text=True)
+    check(done.returncode == 0 and done.stdout.count("\n") == 1 and "the store has 0 of the mission's 1" in done.stderr, f"removed telemetry: {done}")
     # Controls in a text of another user reach a file unchanged, a terminal in writing.
     for command in (["export", "missions"], ["missions", "--json"], ["missions"]):
         printed = on_a_terminal([options.client, *command, *server])

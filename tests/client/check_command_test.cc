@@ -123,6 +123,25 @@ TEST_F(CheckCommand, ReadsTableThroughMapping) {
   EXPECT_THAT(fields, ::testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
 }
 
+TEST_F(CheckCommand, ReportsUnmeasuredBatteryPower) {
+  std::string csv = "t,r,l,v,i\n";
+  for (int k = 0; k < 200; ++k)
+    csv += fmt::format("{},{},1.5,{},{}\n", 0.05 * k, 0.1 * k, 24 - 0.01 * k, k % 7 == 0 ? "" : "3");
+  const std::string table = file("run.csv", csv);
+  json mapping = {{"robot_id", "amr"},
+                  {"time", {{"column", "t"}, {"unit", "s"}}},
+                  {"empty_cells", "unmeasured"},
+                  {"fields",
+                   {{"wheel_velocity", {{{"column", "r"}}, {{"column", "l"}}}},
+                    {"battery_voltage", {{"column", "v"}}},
+                    {"battery_current", {{"column", "i"}}}}}};
+  EXPECT_EQ(check({table, "--mapping", file("m.json", mapping.dump())}), Exit::warned);
+  EXPECT_THAT(printed_, HasSubstr("29 of 200 messages lack the battery's voltage or current"));
+  mapping["fields"].erase("battery_voltage");
+  EXPECT_EQ(check({table, "--mapping", file("n.json", mapping.dump())}), Exit::warned);
+  EXPECT_THAT(printed_, HasSubstr("200 of 200 messages"));
+}
+
 TEST_F(CheckCommand, NamesDoubledCountsOfTables) {
   made::Robot robot = made::virtual_robot("amr", 3, [](auto& spec) {
     spec.sensors.motor_channels = false;
