@@ -205,10 +205,12 @@ struct Application::Parts {
                                  [this](history::Command command) { offer(std::move(command)); });
     };
     writing.on_mission_ended = [this](const history::Mission& mission) {
-      std::string text = answers::mission_table().text(mission);
-      http::round_numbers(text, http::usual_digits);
-      events.publish("mission", text, mission.robot_id);
-      if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, text);
+      survive("mission events", [&] {
+        std::string text = answers::mission_table().text(mission);
+        http::round_numbers(text, http::usual_digits);
+        events.publish("mission", text, mission.robot_id);
+        if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, text);
+      });
     };
     writer = std::make_unique<history::Writer>(*store, std::move(writing));
     tell_of_faults();
@@ -567,7 +569,7 @@ struct Application::Parts {
   }
 
   void run_beat(const std::stop_token& stop) {
-    server::FleetEvents fleet_events(*services, recent, events);
+    server::FleetEvents fleet_events(*services, recent, events, is_own());
     do {
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
       survive("tokens", [&] { read_tokens(); });

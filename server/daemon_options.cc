@@ -89,7 +89,8 @@ Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options
   mqtt.broker.port = broker.port;
   mqtt.broker.tls = broker.tls;
   if (const std::string& file = options.mqtt_password_file; !file.empty()) {
-    if (mqtt.broker.user.empty()) return invalid("mqtt.password_file", "needs mqtt.user");
+    if (mqtt.broker.user.empty())
+      return invalid("mqtt.password_file", "requires mqtt.user: MQTT has no password without a user name");
     Result<std::string> password = access::read_secret(file, 1);
     if (!password) return invalid("mqtt.password_file", describe(password.error()));
     mqtt.broker.password = std::move(*password);

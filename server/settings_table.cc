@@ -104,7 +104,7 @@ constexpr Setting table[] = {
      "PEM file of the certificate authorities of the broker's certificate; empty: those of the system"},
     {"mqtt.user", MEMBER(mqtt.broker.user), 0, 0, "", "user name at the broker; empty: none"},
     {"mqtt.password_file", MEMBER(mqtt_password_file), 0, 0, "",
-     "file of this user's password, readable only by its owner"},
+     "file of this user's password, readable only by its owner; requires mqtt.user"},
     {"mqtt.client_id", MEMBER(mqtt.broker.client_id), 0, 0, "",
      "MQTT client identifier, unique among the clients of the broker"},
     {"mqtt.interface", MEMBER(mqtt.interface), 0, 0, "",

@@ -109,15 +109,11 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
                                     fastest),
                         fastest});
   const std::uint64_t samples = tally.sequence.received;
-  std::uint64_t powered = samples;
-  for (const telemetry::FieldTally& field : tally.fields)
-    if (field.name.starts_with("battery_")) powered = std::min(powered, field.measured);
-  if (const std::uint64_t lacking = samples - powered; lacking > 0)
+  if (const std::uint64_t lacking = samples - std::min(samples, tally.powered); lacking > 0)
     findings.push_back(
-        {false, channel, "battery",
-         fmt::format("{} of {} messages lack the battery's voltage or current: their energy is "
-                     "that of the model",
-                     lacking, samples),
+        {false, channel, "battery_voltage, battery_current",
+         fmt::format("one of them is missing in {} of {} messages, in which energy is the model's", lacking,
+                     samples),
          static_cast<double>(lacking)});
   if (robot_file || fastest <= windows::moving_rad_s) return;
   for (const telemetry::FieldTally& field : tally.fields) {

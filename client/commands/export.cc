@@ -51,7 +51,8 @@ Result<Exit> write_pages(const ExportOptions& options, const std::string& path, 
   for (bool first = true; !target.empty(); first = false) {
     TRY_ASSIGN(const auto reply, ask(options.server, HttpMethod::get, target, {}, renamed, accept_csv));
     std::string_view text = reply.body;
-    const std::string_view lines = text.substr(std::min(text.find('\n'), text.size() - 1) + 1);
+    const auto titles = text.find('\n');
+    const std::string_view lines = titles == text.npos ? std::string_view() : text.substr(titles + 1);
     rows += static_cast<std::uint64_t>(std::ranges::count(lines, '\n'));
     if (!first) text = lines;
     progress.reach(rows);
@@ -63,7 +64,9 @@ Result<Exit> write_pages(const ExportOptions& options, const std::string& path, 
   }
   if (file) TRY(file->commit());
   if (rows < all_rows)
-    fmt::print(stderr, "joulecast: the store has {} of the mission's {} samples: see store.retention_days\n",
+    fmt::print(stderr,
+               "joulecast: the store has {} of the mission's {} samples: store.retention_days and "
+               "store.retention_bytes limit recordings\n",
                rows, all_rows);
   return Exit::ok;
 }

@@ -86,7 +86,7 @@ Result<Exit> copy(StoreOptions& options) {
     return Exit::ok;
   }
   print_tables(document);
-  if (copied.rows_found > 0) fmt::print("{} rows were there already\n", copied.rows_found);
+  if (copied.rows_found > 0) fmt::print("{} rows were already in the destination\n", copied.rows_found);
   fmt::print("every table is equal in both stores\n");
   return Exit::ok;
 }

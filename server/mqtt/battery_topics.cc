@@ -166,7 +166,9 @@ Result<void> BrokerLink::start() {
     static_cast<BrokerLink*>(self)->on_acknowledged(message);
   });
   mosquitto_log_callback_set(handle_, [](mosquitto*, void* self, int level, const char* text) {
-    if (level == MOSQ_LOG_ERR) static_cast<BrokerLink*>(self)->fault_ = text;
+    if (level != MOSQ_LOG_ERR) return;
+    std::string& fault = static_cast<BrokerLink*>(self)->fault_;
+    fault.append(fault.empty() ? "" : "; ").append(text);
   });
   TRY(done(mosquitto_threaded_set(handle_, true), "mqtt.url"));
   if (options_.tls) TRY(set_tls());
@@ -251,6 +253,7 @@ bool BrokerLink::has_left() {
 
 void BrokerLink::on_connect(int code) {
   connected_ = code == 0;
+  if (connected_) fault_.clear();
   tell(code == 0 ? "" : mosquitto_connack_string(code));
 }
 void BrokerLink::on_acknowledged(int message) {

@@ -64,7 +64,7 @@ class BrokerLink {
   mosquitto* handle_ = nullptr;
   std::atomic<bool> connected_ = false;
   std::thread thread_;
-  std::string fault_;  // of TLS, as the library logs it; of the thread
+  std::string fault_;  // errors that the library logged during this attempt; of the thread
   std::mutex mutex_;
   std::condition_variable wake_;
   int awaited_ = 0;       // the last message that requires an acknowledgement

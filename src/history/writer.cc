@@ -358,8 +358,8 @@ bool Writer::settle(std::vector<Outcome>& outcomes, bool idle, double duration_s
         begun != nullptr && outcomes[k].value_or(0) > 0 && options_.on_reused_name)
       options_.on_reused_name(begun->mission, *outcomes[k]);
     if (const auto* last = std::get_if<CheckpointMission>(&batch_.commands[k]);
-        last != nullptr && outcomes[k] && last->mission.state != MissionState::open &&
-        options_.on_mission_ended)
+        last != nullptr && outcomes[k].value_or(0) > 0 && last->mission.state != MissionState::open &&
+        options_.on_mission_ended)  // 0: dropped, as another daemon keeps the robot
       options_.on_mission_ended(last->mission);
   }
   bool recovered = false;

@@ -45,7 +45,8 @@ struct WriterOptions {
   // Receives each mission that began under a name that its robot has used, with the key of the last mission
   // of that name; called on the writer's thread.
   std::function<void(const Mission&, MissionKey)> on_reused_name = {};
-  // Receives each mission of which a checkpoint with its end was committed; called on the writer's thread.
+  // Receives each mission whose end was committed by a checkpoint of its own; called on the writer's thread.
+  // After an exception the batch is committed again.
   std::function<void(const Mission&)> on_mission_ended = {};
   // Called with every accepted event, before it is committed, under the queue's lock: it must neither block
   // nor call the writer.

@@ -108,6 +108,7 @@ void ChannelWatch::take(ChannelTally& tally, const std::string& robot_id, const 
     ++tally.bridged;
     tally.bridged_s += decided->step_s;
   }
+  tally.powered += std::isfinite(sample.battery_voltage_v) && std::isfinite(sample.battery_current_a) ? 1 : 0;
   const auto numbers = signals::numbers_of(sample);
   for (std::size_t k = 0; k < numbers.size(); ++k) tally.fields[k].take(*numbers[k]);
 }

@@ -36,6 +36,7 @@ struct ChannelTally {
   std::int64_t longest_silence_us = 0;                 // between two messages, as received
   std::string last_text;                               // of an event: "finished m-12"
   std::vector<FieldTally> fields;                      // in the order of the message; of events none
+  std::uint64_t powered = 0;                           // messages with voltage and current of the battery
   SequenceCounters sequence;                           // of telemetry
   std::uint64_t gaps = 0, bridged = 0;                 // steps of telemetry: signals/gaps.h
   double bridged_s = 0;                                // of the bridged steps

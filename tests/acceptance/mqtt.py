@@ -76,9 +76,9 @@ def schema_of_messages(shared):
 
 def faults_are_told(options, secret):
     here = ["--mqtt-url", "mqtt://here"]
-    for settings, field in ((["--mqtt-url", "http://here"], "mqtt.url"), ([*here, "--mqtt-interface", "a/b"], "mqtt.interface"),
+    for settings, field in ((["--mqtt-url", "http://here"], "mqtt.url:"), ([*here, "--mqtt-interface", "a/b"], "mqtt.interface:"),
                             ([*here, "--mqtt-user", "fleet", "--mqtt-password-file", secret], "mqtt.password_file: /"),
-                            ([*here, "--mqtt-password-file", secret], "mqtt.password_file: needs mqtt.user")):
+                            ([*here, "--mqtt-password-file", secret], "mqtt.password_file: requires mqtt.user")):
         done = subprocess.run([options.daemon, "--check-config", *settings], capture_output=True, text=True)
         check(done.returncode == 2 and field in done.stderr, f"{settings}: {done.returncode}, {done.stderr}")
 

@@ -124,10 +124,14 @@ TEST_F(CheckCommand, ReadsTableThroughMapping) {
 }
 
 TEST_F(CheckCommand, ReportsUnmeasuredBatteryPower) {
-  std::string csv = "t,r,l,v,i\n";
-  for (int k = 0; k < 200; ++k)
-    csv += fmt::format("{},{},1.5,{},{}\n", 0.05 * k, 0.1 * k, 24 - 0.01 * k, k % 7 == 0 ? "" : "3");
-  const std::string table = file("run.csv", csv);
+  const auto table_of = [&](const std::string& name, bool lacks) {
+    std::string csv = "t,r,l,v,i\n";
+    for (int k = 0; k < 200; ++k)
+      csv += fmt::format("{},{},{},{},{}\n", 0.05 * k, 0.1 * k, 0.09 * k, 24 - 0.01 * k,
+                         lacks && k % 7 == 0 ? "" : fmt::to_string(3 + 0.01 * k));
+    return file(name, csv);
+  };
+  const std::string table = table_of("run.csv", true);
   json mapping = {{"robot_id", "amr"},
                   {"time", {{"column", "t"}, {"unit", "s"}}},
                   {"empty_cells", "unmeasured"},
@@ -135,11 +139,14 @@ TEST_F(CheckCommand, ReportsUnmeasuredBatteryPower) {
                    {{"wheel_velocity", {{{"column", "r"}}, {{"column", "l"}}}},
                     {"battery_voltage", {{"column", "v"}}},
                     {"battery_current", {{"column", "i"}}}}}};
+  check({table_of("whole.csv", false), "--mapping", file("m.json", mapping.dump())});
+  EXPECT_THAT(printed_, ::testing::Not(HasSubstr("battery_current:")));
   EXPECT_EQ(check({table, "--mapping", file("m.json", mapping.dump())}), Exit::warned);
-  EXPECT_THAT(printed_, HasSubstr("29 of 200 messages lack the battery's voltage or current"));
+  EXPECT_THAT(printed_,
+              HasSubstr("battery_voltage, battery_current: one of them is missing in 29 of 200 messages"));
   mapping["fields"].erase("battery_voltage");
   EXPECT_EQ(check({table, "--mapping", file("n.json", mapping.dump())}), Exit::warned);
-  EXPECT_THAT(printed_, HasSubstr("200 of 200 messages"));
+  EXPECT_THAT(printed_, HasSubstr("missing in 200 of 200 messages"));
 }
 
 TEST_F(CheckCommand, NamesDoubledCountsOfTables) {
