@@ -77,8 +77,7 @@ TorqueBalance<S> BasicDriveModel<S>::balance(const Instant& at) const {
 
   for (std::size_t s : {0u, 1u}) {
     b.inertial_nm[s] = ground[s] + p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
-    S transmitted = b.inertial_nm[s];
-    S inside = 0;
+    S &transmitted = b.transmitted_nm[s] = b.inertial_nm[s], &inside = b.inside_nm[s];
     for (std::size_t k = 0; k < load_count && !loads_.empty(); ++k)
       (k == static_cast<std::size_t>(Load::internal) ? inside : transmitted) += b.loads.torque[k][s];
     b.friction_nm[s] = p.friction_torque_nm[s] * context.direction[s] +

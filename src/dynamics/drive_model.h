@@ -31,7 +31,8 @@ struct TorqueBalance {
   std::array<S, 2> gear_nm{};      // gear loss
   std::array<S, 2> friction_nm{};  // T_m sgn(w) + nu w
   Loads<S> loads;
-  std::array<S, 2> total_nm{};  // the motor's torque at the wheel
+  std::array<S, 2> transmitted_nm{}, inside_nm{};  // inertia and loads, through the gear and in the motor
+  std::array<S, 2> total_nm{};                     // the motor's torque at the wheel
 };
 
 // The drive of one robot: motion -> torque -> current -> voltage -> power, with the effects in force. Thesis,

@@ -44,7 +44,7 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
   e.up = 1 + p.driver_loss;
   e.down = 1 - p.unreturned - p.driver_loss;
   for (std::size_t s : {0u, 1u}) {
-    e.resistance_ohm[s] = p.resistance_ohm[s];
+    e.volts_per_nm[s] = p.resistance_ohm[s] / p.torque_constant_nm_a;
     e.copper_w_n2_m2[s] = p.resistance_ohm[s] / (p.torque_constant_nm_a * p.torque_constant_nm_a);
   }
   return loads;
@@ -77,25 +77,29 @@ WheelLoads DriveLoads::at(const Run& run, const Place& place) const {
     for (std::size_t s : {0u, 1u}) {
       // The part of the friction that the gear transmits with the load.
       const double passed = model_.parameters().gear_friction_share * b.friction_nm[s];
-      t.through[s] = b.inertial_nm[s] + passed;
-      t.inside[s] = b.friction_nm[s] - passed;
-      for (std::size_t k = 0; k < dynamics::load_count; ++k) {
-        (k == static_cast<std::size_t>(Load::internal) ? t.inside : t.through)[s] += b.loads.torque[k][s];
-      }
+      t.through[s] = b.transmitted_nm[s] + passed;
+      t.inside[s] = b.inside_nm[s] + (b.friction_nm[s] - passed);
     }
     return t;
   };
+  const Instant rolls = instant(run, place, 1, 0);
+  const auto &pace = rolls.wheel_speed_rad_s, &bend = rolls.wheel_acceleration_rad_s2;
   const auto torques = [&](double speed, double acceleration) {
-    return torques_at(instant(run, place, speed, acceleration));
+    Instant at = rolls;
+    for (std::size_t s : {0u, 1u}) {
+      at.wheel_speed_rad_s[s] = pace[s] * speed;
+      at.wheel_acceleration_rad_s2[s] = pace[s] * acceleration + bend[s] * speed * speed;
+    }
+    return torques_at(at);
   };
   // Half of what the direction of rotation changes, extrapolated to standstill from a quadratic.
   const auto dry = [&](std::array<double, 2> Torques::*part, std::size_t s) {
     double sum = 0;
     for (const auto& [speed, weight] : {std::pair{5.0, 1.5}, {10.0, -1.5}, {15.0, 0.5}}) {
-      Instant rolls = instant(run, place, 0, 0);
+      Instant spins = instant(run, place, 0, 0);
       for (const double sign : {1.0, -1.0}) {
-        rolls.wheel_speed_rad_s = {sign * speed, sign * speed};
-        sum += sign * weight * (torques_at(rolls).*part)[s];
+        spins.wheel_speed_rad_s = {sign * speed, sign * speed};
+        sum += sign * weight * (torques_at(spins).*part)[s];
       }
     }
     return sum;
@@ -104,7 +108,6 @@ WheelLoads DriveLoads::at(const Run& run, const Place& place) const {
   // speeds, well above the creep where dry friction fades, determine the coefficients.
   const Torques slow = torques(0.5, 0), middle = torques(1, 0), fast = torques(1.5, 0),
                 pushed = torques(1, 1);
-  const auto pace = instant(run, place, 1, 0).wheel_speed_rad_s;
   const auto fit = [](double y0, double y1, double y2, double& c0, double& c1, double& c2) {
     c2 = 2 * (y0 - 2 * y1 + y2);
     c1 = y2 - y0 - 2 * c2;

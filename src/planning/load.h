@@ -72,7 +72,7 @@ struct Electric {
   double up = 1, down = 1;
   double torque_constant_nm_a = 0;
   double voltage_constant_v_s_rad = 0;
-  std::array<double, 2> resistance_ohm{};
+  std::array<double, 2> volts_per_nm{};  // of the armature: R/K_t
 };
 
 // The drive model of a robot as the planner needs it.
@@ -88,6 +88,8 @@ class DriveLoads {
 
   // Whether the moment of scrub builds up with the yaw rate.
   bool scrubs() const { return scrub_rate_rad_s_ > 0; }
+
+  bool needs_position() const { return needs_position_; }
 
   // Whether the loads are the same all along the run.
   bool uniform(const Run& run) const;

@@ -361,7 +361,14 @@ bool Run::constant_curvature() const {
 Place Run::at(double way) const {
   auto above = std::upper_bound(knots.begin() + 1, knots.end() - 1, way,
                                 [](double w, const Knot& k) { return w < k.way; });
-  const Knot &b = *above, &a = *(above - 1);
+  auto near = static_cast<std::size_t>(above - knots.begin());
+  return at(way, near);
+}
+
+Place Run::at(double way, std::size_t& near) const {
+  while (near + 1 < knots.size() && knots[near].way <= way) ++near;
+  while (near > 1 && knots[near - 1].way > way) --near;
+  const Knot &b = knots[near], &a = knots[near - 1];
   const double f = std::clamp((way - a.way) / (b.way - a.way), 0.0, 1.0);
   const auto mix = [f](double p, double q) { return p + f * (q - p); };
   const double change = b.curvature_1_m - a.curvature_1_m;

@@ -90,6 +90,8 @@ struct Run {
   bool constant_curvature() const;
   bool straight() const { return constant_curvature() && knots[0].curvature_1_m == 0; }
   Place at(double way) const;
+  // The same, searched for from the knot `near`, which is then the one after it.
+  Place at(double way, std::size_t& near) const;
 };
 
 struct Path {

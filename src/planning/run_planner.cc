@@ -116,7 +116,7 @@ tl::unexpected<Error> stopped() {
 RunPlanner::Ceiling RunPlanner::ceiling(double way) const {
   const Limits& l = problem_->limits;
   const auto& p = loads_->model().parameters();
-  const double turn = run_->turn == 0 ? std::fabs(run_->at(way).curvature_1_m) : 1;
+  const double turn = run_->turn == 0 ? std::fabs(place_at(way).curvature_1_m) : 1;
   const auto pace = dynamics::wheels_of_body(p, run_->turn == 0 ? 1 : 0, turn);
   const double fastest = std::max(std::fabs(pace[0]), std::fabs(pace[1]));
   double v = run_->turn == 0 ? l.speed_m_s : unlimited;
@@ -152,8 +152,7 @@ bool RunPlanner::motors_break(double v, double q) const {
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = loads_here_[s];
     const double t = w.inertia * q + w.t0 + w.f0 + w.f1 * v;
-    const double volts =
-        e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
+    const double volts = e.volts_per_nm[s] * t + e.voltage_constant_v_s_rad * w.pace * v;
     if (std::fabs(t) > torque_limit || std::fabs(volts) > problem_->limits.voltage_v) return true;
   }
   return false;
@@ -246,7 +245,7 @@ SpeedGrid RunPlanner::grid_over(const std::vector<double>& nodes) const {
   } else {
     grid.loads.reserve(n);
     for (std::size_t k = 0; k < n; ++k) {
-      grid.loads.push_back(in_cell(loads_->at(*run_, run_->at(0.5 * (nodes[k] + nodes[k + 1])))));
+      grid.loads.push_back(in_cell(loads_->at(*run_, place_at(0.5 * (nodes[k] + nodes[k + 1])))));
     }
     add_end_loads(nodes, grid);
   }
@@ -282,12 +281,17 @@ void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid
   }
   if (!near) return;
   grid.end_loads.reserve(grid.cells());
+  double slope = 0;  // of the curvature, where the last cell ends
   for (std::size_t k = 0; k < grid.cells(); ++k) {
-    // The slope of the curvature and the direction of a wheel may jump at a node.
-    const auto within = [&](double share) {
-      return in_cell(loads_->at(*run_, run_->at(nodes[k] + share * grid.step[k])));
-    };
-    grid.end_loads.push_back({within(1e-6), within(1 - 1e-6)});
+    // The slope of the curvature, the direction of a wheel, and what depends on the position may jump at a
+    // node.
+    const auto inside = [&](double share) { return place_at(nodes[k] + share * grid.step[k]); };
+    const auto within = [&](const Place& here) { return in_cell(loads_->at(*run_, here)); };
+    const Place first = inside(1e-6), last = inside(1 - 1e-6);
+    const CellLoads* before = k > 0 && first.curvature_slope == slope ? &grid.end_loads[k - 1][1] : nullptr;
+    const bool even = before && !(*before)[0].full && !(*before)[1].full && !loads_->needs_position();
+    grid.end_loads.push_back({even ? *before : within(first), within(last)});
+    slope = last.curvature_slope;
   }
 }
 
@@ -312,8 +316,7 @@ Result<void> RunPlanner::check_feasible() const {
                         number(standing / loads_->electric().torque_constant_nm_a));
       }
       const double brushes = problem_->limits.voltage_v - voltage_limit_v();
-      const double volts =
-          grid.electric.resistance_ohm[s] / grid.electric.torque_constant_nm_a * standing + brushes;
+      const double volts = grid.electric.volts_per_nm[s] * standing + brushes;
       if (volts >= problem_->limits.voltage_v) {
         return fail(Fault::infeasible, "limits/voltage_v",
                     "is " + number(problem_->limits.voltage_v) +
@@ -635,7 +638,7 @@ std::optional<RestMotion> RunPlanner::to_peak(double peak, double price_w) {
 }
 
 double RunPlanner::steady_power_w(double speed) const {
-  const dynamics::Instant at = loads_->instant(*run_, run_->at(0), speed, 0);
+  const dynamics::Instant at = loads_->instant(*run_, place_at(0), speed, 0);
   return loads_->model().flow(at).battery_power_w;
 }
 
@@ -699,7 +702,7 @@ std::vector<double> RunPlanner::least_parts(const SpeedGrid& grid, const std::ve
     for (auto knot = knot_after(nodes[k]); knot->way < nodes[k + 1] && parts[k] != at_knots; ++knot) {
       for (const double side : {-1e-9, 0.0}) {
         const CellLoads here =
-            in_cell(loads_->at(*run_, {*knot, run_->at(knot->way + side).curvature_slope}));
+            in_cell(loads_->at(*run_, {*knot, place_at(knot->way + side).curvature_slope}));
         if (beyond(here, knot->way) > over_between_rows) parts[k] = at_knots;
       }
     }
@@ -829,6 +832,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     rebuild(uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
                                   : split(nodes_, lost, 0.8 * most, parts));
     SpeedSolution finer = solver_->solve(s.price_w, fine_tolerance, stop, due);
+    if (due && !finer.converged) finer = solver_->solve(s.price_w, fine_tolerance, stop);
     if (!finer.converged || (refined_ && !finer.stationary())) {
       if (!refined_) s.gap_j = s.cost_j;  // the error of a coarse grid is unknown
       rebuild(coarse_nodes);
@@ -859,12 +863,12 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
   for (std::size_t k = 0; k < energy.size(); ++k) {
     const double v0 = std::sqrt(z[k]), change = std::sqrt(z[k + 1]) - v0;
     const double span = (nodes[k + 1] - nodes[k]) / (v0 + 0.5 * change);
-    const int parts = loads_->scrubs() ? loads_->at(*run_, run_->at(nodes[k]))[0].parts(v0, v0 + change) : 1;
+    const int parts = loads_->scrubs() ? loads_->at(*run_, place_at(nodes[k]))[0].parts(v0, v0 + change) : 1;
     for (int part = 0; part < parts; ++part) {
       for (const auto& [place, weight] : gauss2) {
         const double at = (part + place) / parts, way = nodes[k] + at * span * (v0 + 0.5 * at * change);
         const dynamics::Instant instant =
-            loads_->instant(*run_, run_->at(way), v0 + at * change, change / span);
+            loads_->instant(*run_, place_at(way), v0 + at * change, change / span);
         energy[k] += weight * span / parts * loads_->model().flow(instant).battery_power_w;
       }
     }

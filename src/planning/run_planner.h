@@ -85,6 +85,7 @@ class RunPlanner {
     Bound bound = Bound::speed;
   };
   Ceiling ceiling(double way) const;
+  Place place_at(double way) const { return run_->at(way, near_); }
   double ceiling_at(double way) const { return ceiling(way).square; }
   double voltage_limit_v() const;
   void find_line();
@@ -137,6 +138,7 @@ class RunPlanner {
   const DriveLoads* loads_;
   const Run* run_;
   const Problem* problem_;
+  mutable std::size_t near_ = 1;  // knot of the place that was looked up last
   double start_ = 0, end_ = 0;
   bool uniform_ = false, refined_ = false;
   std::optional<LineTask> line_;  // where power is quadratic: the task of the closed form

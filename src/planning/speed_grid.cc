@@ -33,12 +33,11 @@ CellLoads in_cell(const WheelLoads& loads) {
 
 MotorUse motor_use(const SpeedGrid& grid, const CellLoads& loads, double v, double q) {
   MotorUse use;
+  const Electric& e = grid.electric;
   for (std::size_t s : {0u, 1u}) {
     const CellLoad& w = loads[s];
-    const Electric& e = grid.electric;
     const auto reach = [&](double t) {
-      const double volts =
-          e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
+      const double volts = e.volts_per_nm[s] * t + e.voltage_constant_v_s_rad * w.pace * v;
       const auto reaches = [&](double share, double& of_limit) {
         double& most = share * w.inertia < 0 ? use.slowing : use.rising;
         most = std::max(most, std::fabs(share)), of_limit = std::max(of_limit, std::fabs(share));
@@ -77,8 +76,8 @@ Reachable reachable(const SpeedGrid& grid, const CellLoads& loads, double v, dou
     };
     if (std::isfinite(grid.torque_limit_nm)) may.torque[s] = beyond(grid.torque_limit_nm);
     if (!std::isfinite(grid.voltage_limit_v)) continue;
-    const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a;
-    low = ohm * std::max(low, -grid.torque_limit_nm), high = ohm * std::min(high, grid.torque_limit_nm);
+    low = e.volts_per_nm[s] * std::max(low, -grid.torque_limit_nm);
+    high = e.volts_per_nm[s] * std::min(high, grid.torque_limit_nm);
     grows_to(e.voltage_constant_v_s_rad * w.pace * v);
     may.voltage[s] = beyond(grid.voltage_limit_v);
   }

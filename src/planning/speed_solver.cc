@@ -185,6 +185,7 @@ void SpeedSolver::each_bound(std::size_t cell, const Node& first, const Node& la
     visit(of_floor, (floor_[cell] - first.z) * a, -a, 0.0, 0.0, 0.0, 0.0);
   }
   if (!(mask >> of_motors)) return;
+  const double by_torque = 1 / grid_.torque_limit_nm, by_voltage = 1 / grid_.voltage_limit_v;
   for (const std::size_t end : {0u, 1u}) {
     if (!(mask >> bound_of(end, 0, false) & 0xffu)) continue;
     const Node& node = end == 0 ? first : last;
@@ -208,13 +209,12 @@ void SpeedSolver::each_bound(std::size_t cell, const Node& first, const Node& la
                                                              ? torque_in_full(w.full->rolling(), v, q)
                                                              : creeping;
       const Electric& e = grid_.electric;
-      const double emf = e.voltage_constant_v_s_rad * w.pace / grid_.voltage_limit_v,
-                   ohm = e.resistance_ohm[s] / e.torque_constant_nm_a / grid_.voltage_limit_v;
+      const double emf = e.voltage_constant_v_s_rad * w.pace * by_voltage,
+                   ohm = e.volts_per_nm[s] * by_voltage;
       for (const unsigned negative : {0u, 1u}) {
         const double sign = negative ? -1 : 1;
         const Torque& t = sign * rolling.t > sign * creeping.t ? rolling : creeping;
-        if (mask >> (of_torque + negative) & 1u)
-          bound(of_torque + negative, sign / grid_.torque_limit_nm, 0, t);
+        if (mask >> (of_torque + negative) & 1u) bound(of_torque + negative, sign * by_torque, 0, t);
         if (mask >> (of_voltage + negative) & 1u) bound(of_voltage + negative, sign * ohm, sign * emf, t);
       }
     }
@@ -314,14 +314,15 @@ bool SpeedSolver::assemble(const std::vector<double>& z) {
     double least = 1, products = 0, push0 = 0, push1 = 0, along0 = 0, along1 = 0;
     each_bound(k, first, last,
                [&](unsigned j, double g, double g0, double g1, double g00, double g01, double g11) {
-                 const double slack = -g, y = state->multiplier, inverse = 1 / slack, weight = y * inverse;
-                 *state++ = {y, slack, g0, g1, 0, j};
+                 const double slack = -g, y = state->multiplier, product = y * slack, inverse = 1 / slack,
+                              r0 = inverse * g0, r1 = inverse * g1;
+                 *state++ = {y, slack, r0, r1, 0, j};
                  least = std::min(least, slack);
                  logarithms.add(slack);
-                 products += y * slack;
-                 d0 += weight * g0 * g0 + y * g00, d1 += weight * g1 * g1 + y * g11,
-                     d01 += weight * g0 * g1 + y * g01;
-                 push0 += inverse * g0, push1 += inverse * g1;
+                 products += product;
+                 d0 += product * r0 * r0 + y * g00, d1 += product * r1 * r1 + y * g11,
+                     d01 += product * r0 * r1 + y * g01;
+                 push0 += r0, push1 += r1;
                  along0 += y * g0, along1 += y * g1;
                });
     if (!(least > 0)) return false;
@@ -505,8 +506,7 @@ double SpeedSolver::step_to_boundary() {
   double used = to_boundary;  // the largest share of a slack by the whole step
   for (std::size_t k = 0; k < grid_.cells(); ++k)
     for (const BoundState& b : bounds_of(k))
-      used = std::max(
-          used, b.change(step_[k], step_[k + 1]) / (b.slack * (b.index < of_motors ? 1 : linear_share)));
+      used = std::max(used, b.used(step_[k], step_[k + 1]) * (b.index < of_motors ? 1 : 1 / linear_share));
   return to_boundary / used;
 }
 
@@ -526,14 +526,13 @@ double SpeedSolver::centre(double mu) {
     raised_.clear();
     for (std::size_t k = 0; k < grid_.cells(); ++k) {
       for (BoundState& b : bounds_of(k)) {
-        const double change = b.change(step_[k], step_[k + 1]), s = b.slack, y = b.multiplier;
-        const double moved =
-            (s - aim * change) * (y * s + aim * (mu + b.raised + y * (change - s)));  // times s
-        if (moved >= least_product * mu * s) continue;
-        const double lacking = least_product * mu - moved / s;
+        const double used = b.used(step_[k], step_[k + 1]), product = b.multiplier * b.slack;
+        const double moved = (1 - aim * used) * (product + aim * (mu + b.raised + product * (used - 1)));
+        if (moved >= least_product * mu) continue;
+        const double lacking = least_product * mu - moved;
         b.raised += lacking;
         raised_.push_back({&b, lacking});
-        slope_[k] += lacking / s * b.by_z0, slope_[k + 1] += lacking / s * b.by_z1;
+        slope_[k] += lacking * b.share0, slope_[k + 1] += lacking * b.share1;
       }
     }
     trial_ = step_;
@@ -582,7 +581,7 @@ void SpeedSolver::update_duals(double mu) {
       const double y = *before++ = b.multiplier;
       // It keeps a share of itself: one that ends at zero does not shorten the others' steps.
       b.multiplier =
-          std::max((1 - to_boundary) * y, (mu + b.raised + y * b.change(step_[k], step_[k + 1])) / b.slack);
+          std::max((1 - to_boundary) * y, (mu + b.raised) / b.slack + y * b.used(step_[k], step_[k + 1]));
     }
     before = std::copy(c.kink.begin(), c.kink.end(), before);
     for (std::size_t s = 0; s < 2 && half_jump_ != 0; ++s) {

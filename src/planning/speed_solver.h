@@ -84,11 +84,12 @@ class SpeedSolver {
   // A bound of a cell: 2 of acceleration, 2 of the speed at its first node; at either end 4 of torque, 4 of
   // voltage.
   struct BoundState {
-    double multiplier = 0, slack = 0, by_z0 = 0, by_z1 = 0;
-    double raised = 0;  // above mu, that multiplier times slack is led to
+    double multiplier = 0, slack = 0;
+    double share0 = 0, share1 = 0;  // of the slack, that z0 and z1 use up for each unit
+    double raised = 0;              // above mu, that multiplier times slack is led to
     unsigned index = 0;
 
-    double change(double dz0, double dz1) const { return by_z0 * dz0 + by_z1 * dz1; }
+    double used(double dz0, double dz1) const { return share0 * dz0 + share1 * dz1; }
   };
 
   // The barrier parameter mu, and the widths that smoothing has at it.

@@ -37,7 +37,7 @@ bool alike(const WheelLoad& a, const WheelLoad& b) {
 UniformMotion::UniformMotion(const UniformTask& task) : task_(task) {
   const Electric& e = task.electric;
   if (alike(task.loads[0], task.loads[1]) && e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] &&
-      e.resistance_ohm[0] == e.resistance_ohm[1])
+      e.volts_per_nm[0] == e.volts_per_nm[1])
     motors_ = 1, each_ = 2;
 }
 
@@ -94,8 +94,7 @@ UniformMotion::Most UniformMotion::most(const Local& l, double direction, double
                voltage_limit = task_.voltage_limit_v * (1 + tolerance);
   for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
-    const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a,
-                 emf = e.voltage_constant_v_s_rad * w.pace * l.v;
+    const double ohm = e.volts_per_nm[s], emf = e.voltage_constant_v_s_rad * w.pace * l.v;
     for (const double side : {-1.0, 1.0}) {
       const double by_voltage = (voltage_limit - side * emf) / ohm;
       const bool by_current = torque_limit <= by_voltage;
