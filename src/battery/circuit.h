@@ -19,8 +19,9 @@ struct CellShape {
   std::span<const std::pair<double, double>> open_circuit_voltage;  // (charge, V), from 0 to 1
 };
 
-// That of which some number has the printed voltage closest to `nominal_voltage_v` > 0; of equally close ones
-// lithium-ion, then iron phosphate, then lead. Lead comes in blocks of three cells (6 V) only.
+// The cell of which some number in series has the printed voltage closest to `nominal_voltage_v` > 0; of
+// equally close ones lithium-ion, then iron phosphate, then lead. Lead comes in blocks of three cells (6 V)
+// only.
 const CellShape& likeliest_cell(double nominal_voltage_v);
 
 // The pack's open-circuit voltage, scaled so that its mean over charge is the nominal voltage: a full pack

@@ -79,8 +79,8 @@ inline constexpr std::size_t max_effect_parameters = 5;
 template <class S>
 using EffectValues = std::array<S, max_effect_parameters>;
 
-// A physical effect that the nominal model leaves out: it changes constants or adds torque at the wheels. For
-// double and Dual, so that every derivative is exact. The table of all is in effects.cc.
+// A physical effect that the nominal model leaves out: it changes constants or adds torque at the wheels, in
+// double and in Dual, so that every derivative is exact. All are in the table of effects.cc.
 class Effect {
  public:
   virtual ~Effect() = default;

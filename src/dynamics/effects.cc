@@ -12,8 +12,8 @@
 namespace joulecast::dynamics {
 namespace {
 
-// Adapts a law to the interface. A law is a generic function without state, for double and Dual, so that
-// every derivative is exact:
+// Adapts a law to the interface; an effect has one. A law is a generic function without state, for double and
+// Dual, so that every derivative is exact:
 //   (EffectValues<S>, Parameters<S>&)                        changes constants
 //   (EffectValues<S>, const LoadContext<S>&, Loads<S>&)      adds torque at the wheels
 template <class Law>

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -73,6 +74,7 @@ class Request {
     }
     Request request(loads, path, problem, stop);
     std::size_t nodes = 0;
+    std::map<std::array<double, 3>, std::size_t> uniform_runs;  // planners by length and loads
     for (std::size_t k = 0; k < path.runs.size(); ++k) {
       if (stop.stop_requested()) return stopped();
       const Run& run = path.runs[k];
@@ -83,12 +85,16 @@ class Request {
       }
       const double start = k == 0 ? problem.start_speed_m_s : 0,
                    end = k + 1 == path.runs.size() ? problem.end_speed_m_s : 0;
-      const auto same = std::ranges::find_if(
-          request.runs_, [&](const RunPlanner& earlier) { return earlier.answers(run, start, end); });
-      request.of_run_.push_back(static_cast<std::size_t>(same - request.runs_.begin()));
-      if (same != request.runs_.end()) {
-        request.counts_[request.of_run_.back()] += 1;
-        continue;
+      std::size_t& first = request.of_run_.emplace_back(request.runs_.size());
+      if (loads.uniform(run)) {
+        const WheelLoads here = loads.at(run, run.at(0.5 * run.length()));
+        const auto [low, high] = std::minmax(here[0].t0, here[1].t0);
+        const auto [like, is_new] = uniform_runs.try_emplace({run.length(), low, high}, first);
+        if (!is_new && request.runs_[like->second].answers(run, here, start, end)) {
+          first = like->second;
+          request.counts_[first] += 1;
+          continue;
+        }
       }
       TRY_ASSIGN(auto planner, RunPlanner::make(robot, loads, run, problem, start, end));
       request.runs_.push_back(std::move(planner));
@@ -382,10 +388,10 @@ class Request {
   const Path& path_;
   const Problem& problem_;
   std::stop_token stop_;
-  // Runs that are alike, as the straights and turns of a grid, are planned once.
+  // Alike runs, as the straights and turns of a grid, share a planner; answers_ and counts_ are by planner.
   std::vector<RunPlanner> runs_;
-  std::vector<double> counts_;       // of the path's runs that each answers
-  std::vector<std::size_t> of_run_;  // of each of the path's runs
+  std::vector<double> counts_;       // runs of the path that share it
+  std::vector<std::size_t> of_run_;  // planner of each of the path's runs
   std::vector<RunAnswer> answers_;
   struct Kept {
     std::vector<RunAnswer> answers;
@@ -544,6 +550,7 @@ Result<Plan> Request::written() {
   Certificate& c = writer.plan().certificate;
   std::array<bool, bound_count> binding{};
   Pose pose;
+  std::vector<double> left = counts_;  // runs to be written
   for (std::size_t k = 0; k < path_.runs.size(); ++k) {
     if (stop_.stop_requested()) return stopped();
     const Run& run = path_.runs[k];
@@ -580,7 +587,7 @@ Result<Plan> Request::written() {
       });
       c.discretisation_j += answer.discretisation_j;
     }
-    if (brief()) answer.forget_motion();
+    if (--left[of_run_[k]] == 0 && brief()) answer.forget_motion();
     if (writer.plan().profile.size() > most_rows) {
       return fail(Fault::too_large, "columns",
                   fmt::format("the motion has more than {} rows; request it without columns, or in parts",

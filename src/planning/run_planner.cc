@@ -547,18 +547,15 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   return planner;
 }
 
-bool RunPlanner::answers(const Run& other, double start_speed, double end_speed) const {
-  const Run& run = *run_;
-  if (!(uniform_ && start_ == start_speed && end_ == end_speed && run.length() == other.length() &&
-        (run.turn == 0) == (other.turn == 0) && loads_->uniform(other)))
-    return false;
-  const auto bend = [](const Run& r) { return std::fabs(r.knots.front().curvature_1_m); };
+bool RunPlanner::answers(const Run& other, const WheelLoads& loads, double start_speed,
+                         double end_speed) const {
+  const auto bend = [](const Run& run) { return std::fabs(run.knots.front().curvature_1_m); };
   const Electric& e = loads_->electric();
   const bool symmetric =
       e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] && e.resistance_ohm[0] == e.resistance_ohm[1];
-  const auto [left, right] = loads_->at(other, other.at(0.5 * other.length()));
-  return bend(run) == bend(other) &&
-         (loads_here_ == WheelLoads{left, right} || (symmetric && loads_here_ == WheelLoads{right, left}));
+  return uniform_ && start_ == start_speed && end_ == end_speed && run_->length() == other.length() &&
+         (run_->turn == 0) == (other.turn == 0) && bend(*run_) == bend(other) &&
+         (loads_here_ == loads || (symmetric && loads_here_ == WheelLoads{loads[1], loads[0]}));
 }
 
 double RunPlanner::shortest_s() {

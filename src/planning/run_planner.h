@@ -64,9 +64,10 @@ class RunPlanner {
   double steady_power_w(double speed) const;
 
   const Run& run() const { return *run_; }
-  // Whether a motion between these speeds along `other`, which may turn to the other side, is one of this
-  // run.
-  bool answers(const Run& other, double start_speed, double end_speed) const;
+  // Whether the motions of this run are also those of `other` between these speeds: both have constant loads,
+  // equal lengths and limits, and equal loads of the wheels or, with equal motors, mirrored ones. `loads`: of
+  // `other`.
+  bool answers(const Run& other, const WheelLoads& loads, double start_speed, double end_speed) const;
   bool uniform() const { return uniform_; }  // loads are the same all along
   bool on_grid() const { return solver_ != nullptr; }
   // Of all grids that it holds, each of some hundred bytes.

@@ -148,7 +148,7 @@ void LagBlock::join(const LagBlock& other, double weight) {
 
 Lags::Lags(std::span<const telemetry::Recording> missions) {
   for (const telemetry::Recording& mission : missions) {
-    const double step_s =
+    const double step_s =  // 0: with fewer than two samples there is none
         mission.samples.size() < 2 ? 0 : std::max(finest_s, windows::median_period_s(mission));
     if (step_s_ == 0) step_s_ = step_s;
     if (step_s_ > 0 && std::fabs(step_s / step_s_ - 1) <= alike_steps) correlate(mission);

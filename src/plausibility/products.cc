@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "statistics/distributions.h"
 #include "statistics/robust.h"

@@ -77,8 +77,8 @@ struct Accounts {
   Ledger ledger;
 };
 
-// Two figures by which missions and sums of missions are compared. This one: measured over modelled energy of
-// the measured time; NaN without any, or where the modelled is not above 0.
+// Measured over modelled energy of the measured time; NaN without any, or where the modelled is not above 0.
+// Missions and sums of missions are compared by this and by the energy a distance.
 inline double energy_ratio(const Accounts& a) {
   const double modelled_j = a.measured_j - a.ledger[Term::unexplained];
   return a.measured_s > 0 && modelled_j > 0 ? a.measured_j / modelled_j

@@ -11,7 +11,7 @@
 
 namespace joulecast::windows {
 
-// One mission's channels as columns, with quantities computed from every sample. Private to this folder.
+// One mission's channels as columns, with quantities computed from every sample.
 struct Track {
   std::vector<double> time_s;  // since the first sample
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
@@ -35,6 +35,7 @@ struct Line {
 Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s,
              double fewest = 3);
 
+// The median time between samples [s], of which there are at least two.
 double median_period_s(const telemetry::Recording& mission);
 
 Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,

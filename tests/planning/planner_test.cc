@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "planning/cost_table.h"
 #include "planning/line.h"
@@ -324,6 +325,15 @@ TEST(Planner, AlikeRunsCountEach) {
     EXPECT_NEAR(whole->summary.energy_j, energy_j, 1e-9 * energy_j);
     EXPECT_NEAR(whole->summary.duration_s, duration_s, 1e-9 * duration_s);
     EXPECT_NEAR(whole->profile.y_m.back(), path.runs.back().knots.back().pose.y_m, 1e-9);
+    Problem hurried = limited(robot, 0);
+    hurried.deadline_s = 0.5 * (whole->certificate.shortest_time_s + duration_s);
+    const auto soon = plan(robot, path, hurried);
+    ASSERT_TRUE(soon) << describe(soon.error());
+    EXPECT_LE(soon->summary.duration_s, *hurried.deadline_s);
+    EXPECT_GT(soon->summary.duration_s, 0.999 * *hurried.deadline_s);
+    const auto& each_s = soon->run_duration_s;
+    EXPECT_EQ(each_s.size(), path.runs.size());
+    EXPECT_NEAR(std::accumulate(each_s.begin(), each_s.end(), 0.0), soon->summary.duration_s, 1e-9);
   }
 }
 
