@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A daemon killed while robots drive: at most a second is lost, nothing is corrupt, the mission continues. Then its live
 interfaces: the energy state on LCM at 1 Hz, the event stream, an orderly stop."""
+import json
 import sqlite3
 import subprocess
 import time
@@ -59,15 +60,22 @@ def main():
         for robot, times in states.items():
             check(5 <= len(times) <= 7, f"{len(times)} energy states of {robot} in 6 s")
 
-        # Live events of both robots.
-        heard = set()
+        # Live events of both robots, and the end of each mission.
+        heard, ended, kind = set(), [], ""
         with urllib.request.urlopen(programs.url + "/v1/events", timeout=10) as stream:
             check(stream.headers.get_content_type() == "text/event-stream", "events are no event stream")
-            until = time.monotonic() + 10
-            while time.monotonic() < until and len(heard) < 2:
-                line = stream.readline().decode()
-                heard |= {robot for robot in robots if f'"{robot}"' in line}
+            until = time.monotonic() + 60
+            while time.monotonic() < until and len(ended) < 2:
+                name, _, value = stream.readline().decode().strip().partition(": ")
+                heard |= {robot for robot in robots if f'"{robot}"' in value}
+                if name == "data" and kind == "mission":
+                    ended.append(json.loads(value))
+                kind = value if name == "event" else kind
         check(len(heard) == 2, f"live events of {heard}")
+        check(sorted(m["robot_id"] for m in ended) == robots, f"events of ended missions: {ended}")
+        for event in ended:
+            stored = programs.get(f"/v1/missions/{event['id']}")
+            check(event["state"] == "finished" and event["samples"] == stored["samples"], f"{event} is stored as {stored}")
 
         for robot in robots:
             mission, = programs.wait_for(robot, 1, 60)

@@ -26,6 +26,7 @@ class FailingStore final : public ForwardingStore {
   }
 
   std::atomic<bool> fails{false};
+  std::atomic<bool> drops{false};  // as of robots that another daemon keeps
   std::atomic<bool> hangs{false};
   std::atomic<bool> lost{false};
   std::atomic<int> attempts{0};
@@ -35,6 +36,7 @@ class FailingStore final : public ForwardingStore {
     ++attempts;
     while (hangs) std::this_thread::sleep_for(milliseconds(1));
     if (fails) return fail(Fault::unavailable, "database", "database or disk is full");
+    if (drops) return std::vector<Outcome>(commands.size(), 0);
     largest_batch = std::max(largest_batch.load(), commands.size());
     const std::lock_guard lock(applying_);
     return store_->apply(commands);
@@ -476,6 +478,10 @@ TEST_F(WriterTest, ReportsEachEndedMission) {
   ASSERT_EQ(ended.size(), 1U);
   EXPECT_EQ(ended[0].key, m.key);
   EXPECT_EQ(ended[0].samples, 10);
+  store_.drops = true;
+  ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, {}, {}}));
+  ASSERT_TRUE(writer.flush());
+  EXPECT_EQ(ended.size(), 1U) << "not stored";
 }
 
 TEST_F(WriterTest, TakesCommandsOfManyThreads) {
