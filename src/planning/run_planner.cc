@@ -551,8 +551,7 @@ bool RunPlanner::answers(const Run& other, const WheelLoads& loads, double start
                          double end_speed) const {
   const auto bend = [](const Run& run) { return std::fabs(run.knots.front().curvature_1_m); };
   const Electric& e = loads_->electric();
-  const bool symmetric =
-      e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] && e.resistance_ohm[0] == e.resistance_ohm[1];
+  const bool symmetric = e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] && e.volts_per_nm[0] == e.volts_per_nm[1];
   return uniform_ && start_ == start_speed && end_ == end_speed && run_->length() == other.length() &&
          (run_->turn == 0) == (other.turn == 0) && bend(*run_) == bend(other) &&
          (loads_here_ == loads || (symmetric && loads_here_ == WheelLoads{loads[1], loads[0]}));
