@@ -142,11 +142,10 @@ TEST_F(CheckCommand, ReportsUnmeasuredBatteryPower) {
   check({table_of("whole.csv", false), "--mapping", file("m.json", mapping.dump())});
   EXPECT_THAT(printed_, ::testing::Not(HasSubstr("battery_current:")));
   EXPECT_EQ(check({table, "--mapping", file("m.json", mapping.dump())}), Exit::warned);
-  EXPECT_THAT(printed_,
-              HasSubstr("battery_voltage, battery_current: one of them is missing in 29 of 200 messages"));
+  EXPECT_THAT(printed_, HasSubstr("battery_voltage, battery_current: one of them is missing in 29\n"));
   mapping["fields"].erase("battery_voltage");
   EXPECT_EQ(check({table, "--mapping", file("n.json", mapping.dump())}), Exit::warned);
-  EXPECT_THAT(printed_, HasSubstr("missing in 200 of 200 messages"));
+  EXPECT_THAT(printed_, HasSubstr("one of them is missing in 200\n"));
 }
 
 TEST_F(CheckCommand, NamesDoubledCountsOfTables) {
