@@ -67,7 +67,8 @@ struct CostTable::Kind {
     if (!numerical) {
       Run unit = run(1);
       unit.payload_kg = payload_kg;
-      TRY_ASSIGN(auto made, RunPlanner::make(robot, planner.loads(), unit, problem, 0, 0));
+      TRY_ASSIGN(auto made, RunPlanner::make(robot, planner.loads(), unit,
+                                             planner.loads().uniform_loads(unit), problem, 0, 0));
       if (const auto cruise = made.cruise_speed(problem.value_of_time_w))
         return along_family(made, *cruise, per_decade);
     }

@@ -73,6 +73,10 @@ struct Electric {
   double torque_constant_nm_a = 0;
   double voltage_constant_v_s_rad = 0;
   std::array<double, 2> volts_per_nm{};  // of the armature: R/K_t
+
+  bool symmetric() const {  // equal motors
+    return copper_w_n2_m2[0] == copper_w_n2_m2[1] && volts_per_nm[0] == volts_per_nm[1];
+  }
 };
 
 // The drive model of a robot as the planner needs it.
@@ -93,6 +97,10 @@ class DriveLoads {
 
   // Whether the loads are the same all along the run.
   bool uniform(const Run& run) const;
+  // Those of a uniform run.
+  std::optional<WheelLoads> uniform_loads(const Run& run) const {
+    return uniform(run) ? std::optional(at(run, run.at(0.5 * run.length()))) : std::nullopt;
+  }
 
   dynamics::Instant instant(const Run& run, const Place& place, double speed, double acceleration) const;
 

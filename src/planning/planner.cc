@@ -86,17 +86,17 @@ class Request {
       const double start = k == 0 ? problem.start_speed_m_s : 0,
                    end = k + 1 == path.runs.size() ? problem.end_speed_m_s : 0;
       std::size_t& first = request.of_run_.emplace_back(request.runs_.size());
-      if (loads.uniform(run)) {
-        const WheelLoads here = loads.at(run, run.at(0.5 * run.length()));
-        const auto [low, high] = std::minmax(here[0].t0, here[1].t0);
+      const std::optional<WheelLoads> uniform = loads.uniform_loads(run);
+      if (uniform) {
+        const auto [low, high] = std::minmax((*uniform)[0].t0, (*uniform)[1].t0);
         const auto [like, is_new] = uniform_runs.try_emplace({run.length(), low, high}, first);
-        if (!is_new && request.runs_[like->second].answers(run, here, start, end)) {
+        if (!is_new && request.runs_[like->second].answers(run, *uniform, start, end)) {
           first = like->second;
           request.counts_[first] += 1;
           continue;
         }
       }
-      TRY_ASSIGN(auto planner, RunPlanner::make(robot, loads, run, problem, start, end));
+      TRY_ASSIGN(auto planner, RunPlanner::make(robot, loads, run, uniform, problem, start, end));
       request.runs_.push_back(std::move(planner));
       request.counts_.push_back(1);
       if ((nodes += request.runs_.back().nodes()) > most_nodes) return too_long();

@@ -520,17 +520,18 @@ std::vector<double> RunPlanner::resampled(const std::vector<double>& nodes, cons
 }
 
 Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run,
-                                    const Problem& problem, double start_speed, double end_speed) {
+                                    const std::optional<WheelLoads>& uniform, const Problem& problem,
+                                    double start_speed, double end_speed) {
   RunPlanner planner(robot, loads, run, problem);
   planner.start_ = start_speed;
   planner.end_ = end_speed;
-  planner.uniform_ = loads.uniform(run);
+  planner.uniform_ = uniform.has_value();
   if (!planner.uniform_ && run.knots.size() > most_cells) {
     return fail(Fault::too_large, "path",
                 "has a run between stops of more than 200000 knots, which are 1 cm apart on curves; give it "
                 "in parts");
   }
-  if (planner.uniform_) planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()));
+  if (uniform) planner.loads_here_ = *uniform;
   if (planner.uniform_ && (run.turn != 0 || problem.limits.least_speed_m_s == 0)) {
     planner.find_line();
     // Without active motor limits, the closed form determines feasibility; the grid is built only when it is
@@ -550,11 +551,10 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
 bool RunPlanner::answers(const Run& other, const WheelLoads& loads, double start_speed,
                          double end_speed) const {
   const auto bend = [](const Run& run) { return std::fabs(run.knots.front().curvature_1_m); };
-  const Electric& e = loads_->electric();
-  const bool symmetric = e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] && e.volts_per_nm[0] == e.volts_per_nm[1];
   return uniform_ && start_ == start_speed && end_ == end_speed && run_->length() == other.length() &&
          (run_->turn == 0) == (other.turn == 0) && bend(*run_) == bend(other) &&
-         (loads_here_ == loads || (symmetric && loads_here_ == WheelLoads{loads[1], loads[0]}));
+         (loads_here_ == loads ||
+          (loads_->electric().symmetric() && loads_here_ == WheelLoads{loads[1], loads[0]}));
 }
 
 double RunPlanner::shortest_s() {

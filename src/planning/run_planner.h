@@ -41,9 +41,10 @@ tl::unexpected<Error> stopped();
 // Solves one run for any price of time; keeps its grid and last solution between calls.
 class RunPlanner {
  public:
-  // Ends at rest unless speeds are given. Errors are Planner's.
+  // `uniform`: the run's DriveLoads::uniform_loads(). Errors are Planner's.
   static Result<RunPlanner> make(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run,
-                                 const Problem& problem, double start_speed, double end_speed);
+                                 const std::optional<WheelLoads>& uniform, const Problem& problem,
+                                 double start_speed, double end_speed);
 
   // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
   // acceleration. On a grid, `due` makes the price a first guess.

@@ -35,10 +35,7 @@ bool alike(const WheelLoad& a, const WheelLoad& b) {
 }  // namespace
 
 UniformMotion::UniformMotion(const UniformTask& task) : task_(task) {
-  const Electric& e = task.electric;
-  if (alike(task.loads[0], task.loads[1]) && e.copper_w_n2_m2[0] == e.copper_w_n2_m2[1] &&
-      e.volts_per_nm[0] == e.volts_per_nm[1])
-    motors_ = 1, each_ = 2;
+  if (alike(task.loads[0], task.loads[1]) && task.electric.symmetric()) motors_ = 1, each_ = 2;
 }
 
 tl::unexpected<Error> endless(double standing_w) {
