@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "gap/equations/cause.h"
+#include "gap/posterior/catalogue.h"
 
 namespace joulecast::gap {
 namespace {

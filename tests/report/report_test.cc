@@ -101,7 +101,7 @@ Diagnosis full_diagnosis() {
                        .windows = 49,
                        .label = ""}}}};
   d.figures.cell_m = 2;
-  for (const double x : {0.0, 2.0, 4.0, 6.0}) d.figures.floor.push_back({x, 0, 78.4, 11.3, 37});
+  for (const double x : {0.0, 2.0, 4.0, 6.0}) d.figures.floor.push_back({x, 0, 78.4, 11.3, 0, 37, {}});
   d.figures.stretch_of = "tour";
   for (const double t : {0.0, 1.0, 2.0, 3.0, 4.0, 5.0}) d.figures.power.push_back({t, 200, 150, 190});
   d.figures.missions = {{"tour", 1'769'853'600'000'000, 612, 23.4, 0.3361, 0.0447, 0.2411, 0.0683}};

@@ -8,11 +8,8 @@
 #include <tuple>
 
 #include "base/try.h"
-#include "gap/diagnose/gap_by_channel.h"
-#include "gap/diagnose/late_battery.h"
 #include "gap/diagnose/ripple.h"
 #include "gap/posterior/explain_recordings.h"
-#include "gap/traits.h"
 #include "gap/verdict/answer.h"
 #include "gap/verdict/next_drive.h"
 #include "gap/verdict/text.h"
@@ -24,7 +21,7 @@ namespace joulecast::gap {
 namespace {
 
 using posterior::Explained;
-using posterior::ExplainedBy;
+using posterior::ix;
 
 constexpr std::size_t ripple_surrogates = 20;
 
@@ -52,6 +49,83 @@ using GapSize = std::pair<double, double>;
 GapSize gap_size(const posterior::Data& data, const Eigen::VectorXd& modelled_w) {
   const Eigen::VectorXd measured_w = data.rows.measured_w(), apart_w = measured_w - modelled_w;
   return {apart_w.sum() / measured_w.sum(), apart_w.lpNorm<1>() / measured_w.lpNorm<1>()};
+}
+
+// Mean sizes over the rows with a finite reading.
+class MeanSizes {
+ public:
+  void add(double gap, double reading) {
+    if (!std::isfinite(gap + reading)) return;
+    gap_ += std::fabs(gap);
+    size_ += std::fabs(reading);
+    ++count_;
+  }
+  // `rest`: mean |residual| in the channel's unit.
+  void report(std::string channel, double rest, std::vector<ChannelGap>& gaps) const {
+    if (count_ < posterior::fewest_rows || !(size_ > 0)) return;
+    gaps.push_back({std::move(channel), gap_ / size_, rest * static_cast<double>(count_) / size_});
+  }
+
+ private:
+  double gap_ = 0, size_ = 0;
+  std::size_t count_ = 0;
+};
+
+// Mean |residual| of a channel; NaN: the channel has no rows.
+double rest_of(const posterior::Fit& fit, Channel channel) {
+  for (std::size_t c = 0; c < fit.noise.size(); ++c)
+    if (fit.equations.channels[c].channel == channel) return fit.noise[c].rest;
+  return missing;
+}
+
+// The same of battery power, which has no rows of its own where motor channels have: a fit of all effects.
+double rest_of_power(const posterior::Fit& fit) {
+  if (!fit.data.motors) return rest_of(fit, Channel::power);
+  const posterior::PowerRows& power = fit.data.rows;
+  posterior::ChannelRows rows = posterior::channel_rows(power);
+  for (std::size_t k = 0; k < fit.equations.effects; ++k) rows.columns.push_back(ix(k));
+  rows.x = fit.equations.moved;
+  rows.y = power.measured_w() - fit.equations.modelled_w + rows.x * fit.equations.point;
+  return posterior::learn_noise(rows, fit.equations, fit.functions).rest;
+}
+
+// Returns the gap of each kind of recorded reading, and its noise floor: the residual of a fit of all
+// columns. A battery voltage is compared after its open-circuit level was fitted to each block.
+std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit) {
+  const posterior::Data& d = fit.data;
+  std::vector<ChannelGap> gaps;
+  MeanSizes battery, motors, terminals, turning;
+  if (d.power) {
+    for (std::size_t r = 0; r < d.rows.size(); ++r)
+      battery.add(d.rows.power_w[r] - fit.unchanged_w[ix(r)], d.rows.power_w[r]);
+    if (d.rows.meter.empty()) battery.report("battery_power", rest_of_power(fit), gaps);
+  }
+  const dynamics::DriveModel model(d.robot, d.in_file);
+  const double torque = rest_of(fit, Channel::torque_right), voltage = rest_of(fit, Channel::voltage_right);
+  const bool volts_read = voltages_read(d.windows);
+  double rest_w = 0, count = 0;
+  for (std::size_t k = 0; k < d.windows.size(); ++k) {
+    const Window& w = d.windows[k];
+    terminals.add(0, d.battery_voltage_v[k]);
+    turning.add(residuals(model, w, false)[index_of(Channel::gyro)], w.yaw_rate_rad_s);
+    const double read_w = motors_power(w, d.robot, volts_read);
+    if (!std::isfinite(read_w)) continue;
+    motors.add(read_w - metered_powers(model, w).motors_w, read_w);
+    for (const std::size_t s : {0u, 1u}) {
+      const double winding = std::isfinite(voltage) ? voltage * w.current_a[s] : 0;
+      rest_w += std::hypot(torque * motor_voltage(w, d.robot, s), winding);
+    }
+    count += 1;
+  }
+  if (std::isfinite(rest_w)) motors.report("motor_power", rest_w / std::max(count, 1.0), gaps);
+  if (const double rest = rest_of(fit, Channel::battery_voltage); std::isfinite(rest)) {
+    terminals.report("battery_voltage", rest, gaps);
+    if (!gaps.empty() && gaps.back().channel == "battery_voltage")
+      gaps.back().absolute_relative = gaps.back().noise_floor;
+  }
+  if (const double rest = rest_of(fit, Channel::gyro); std::isfinite(rest))
+    turning.report("yaw_rate", rest, gaps);
+  return gaps;
 }
 
 class Diagnoser {
@@ -215,7 +289,7 @@ class Diagnoser {
       const double t_s = rows.window(r).t_s;
       if (t_s > end_s / 3 && t_s < 2 * end_s / 3) continue;
       const std::size_t at = t_s > end_s / 3 ? 1 : 0;
-      sum[at] += rows.power_w[r] - answer_.explained_w[posterior::ix(r)] + load_w;
+      sum[at] += rows.power_w[r] - answer_.explained_w[ix(r)] + load_w;
       count[at] += 1;
     }
     return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
@@ -237,8 +311,7 @@ class Diagnoser {
     const auto before = all(fit_->unchanged_w),
                after = d_.verdict == Verdict::none ? before : all(answer_.explained_w);
     if (d_.verdict != Verdict::none)
-      d_.where = localise(windows, robot_, rows.power_w, before, d_.noise_floor);
-    for (WhereRegion& region : d_.where) region.channel = power_channel();
+      d_.where = localise(windows, robot_, rows.power_w, before, d_.noise_floor, power_channel());
     d_.figures = figures_of(windows, rows.power_w, before, after, recordings_, robot_);
   }
 
@@ -333,6 +406,34 @@ std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, robot:
   return checks;
 }
 
+void move_back(telemetry::Recording& mission, double delay_s, bool battery_alone) {
+  using namespace plausibility::reading;
+  constexpr double rounding = 1e-6;
+  struct Row {
+    double t_s;
+    std::array<double, battery_current + 1 - motor_voltage> readings;
+  };
+  std::vector<Row> rows;
+  for (const signals::Sample& s : mission.samples) {
+    Row& row = rows.emplace_back();
+    row.t_s = 1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us);
+    for (std::size_t c = motor_voltage; c <= battery_current; ++c)
+      row.readings[c - motor_voltage] = *signals::numbers_of(s)[c];
+  }
+  std::size_t next = 1;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double at_s = rows[k].t_s + delay_s;
+    while (next + 1 < rows.size() && rows[next].t_s < at_s) ++next;
+    const Row &a = rows[next - 1], &b = rows[std::min(next, rows.size() - 1)];
+    const double part = (at_s - a.t_s) / (b.t_s - a.t_s);
+    const bool inside = part >= -rounding && part <= 1 + rounding;
+    const auto moved = signals::numbers_of(mission.samples[k]);
+    for (std::size_t c = battery_alone ? battery_voltage : motor_voltage; c <= battery_current; ++c)
+      *moved[c] = inside ? std::lerp(a.readings[c - motor_voltage], b.readings[c - motor_voltage], part)
+                         : signals::unmeasured;
+  }
+}
+
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& file,
                            const Progress& progress) {
   telemetry::RecordingSet trusted = recordings;
@@ -341,12 +442,9 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const auto [electrical_s, battery_s] = measured_delay(checks, trusted);
   GapSize as_read;
   if (electrical_s != 0) as_read = gap_as_read(trusted, robot);
-  for (telemetry::Recording& mission : trusted.missions) {
-    if (battery_s != 0)
-      move_battery_back(mission, battery_s);
-    else if (electrical_s != 0)
-      move_electrical_back(mission, electrical_s);
-  }
+  for (telemetry::Recording& mission : trusted.missions)
+    if (battery_s != 0 || electrical_s != 0)
+      move_back(mission, battery_s != 0 ? battery_s : electrical_s, battery_s != 0);
   const auto late = std::ranges::find(checks, "electrical_delay", &Check::id);
   if (late != checks.end()) late->says += " The diagnosis uses readings that are moved back by this delay.";
   // Where a sensor or the robot changed between missions, each side is diagnosed separately: the later one is

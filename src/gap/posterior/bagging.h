@@ -35,4 +35,11 @@ struct Summary {
 };
 Summary summarise(const Fit& fit, const Eigen::VectorXd& probability);
 
+// How constant a strength is over the blocks, formula (5).
+struct Constancy {
+  double probability = 1;  // that it differs between blocks by less than half of itself
+  double scatter = 0;      // posterior mean of rho
+};
+Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member);
+
 }  // namespace joulecast::gap::posterior

@@ -1,13 +1,38 @@
 #pragma once
 
+#include <cmath>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "gap/equations/cause.h"
 #include "gap/posterior/data.h"
 
 namespace joulecast::gap {
+
+// A further variable that a cause follows: a covariate, by its distance from `centre`.
+struct Modulation {
+  std::size_t covariate = 0;  // index in Window::covariates
+  double centre = 0;
+
+  // 0 where the covariate is missing, as if it were at its centre.
+  double of(const Window& w) const {
+    const double value = covariate < w.covariates.size() ? w.covariates[covariate] : missing;
+    return std::isfinite(value) ? value - centre : 0;
+  }
+};
+
+// Each covariate that is finite in at least half of the windows and differs among them.
+std::vector<Modulation> modulations_of(std::span<const Window> windows);
+
+// A cause found, with its strength: an effect in force, or an effect with parameter `parameter` as its
+// strength per unit of a covariate.
+struct Cause {
+  dynamics::ActiveEffect effect;
+  std::size_t parameter = 0;
+  std::optional<Modulation> by;
+};
 
 // An effect of the catalogue in one of its shapes, or a covariate with the effect that carries it.
 struct Hypothesis : Cause {
@@ -32,11 +57,6 @@ struct EffectColumn : Cause {
   std::size_t hypothesis = 0;
 };
 
-// A disc of the floor.
-struct Zone {
-  double x_m = 0, y_m = 0, radius_m = 0;
-};
-
 // Every effect that these recordings can show, each in some shapes. A hypothesis has one column, or two a
 // quarter turn apart (slope). Its bounds apply to the strength added to the robot file's own.
 struct Catalogue {
@@ -48,10 +68,6 @@ struct Catalogue {
 };
 
 Catalogue make_catalogue(const Data& data);
-
-// Discs of the floor, at most `most`, in which the residual of power is largest beyond a constant, friction
-// and speed.
-std::vector<Zone> find_zones(const Data& data, const Eigen::VectorXd& residual_w, std::size_t most = 3);
 
 // The effects in force with these strengths of all columns (covariates excepted, which are linear).
 std::vector<dynamics::ActiveEffect> in_force(const Data& data, const Catalogue& catalogue,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -28,25 +29,29 @@ bool rolls_less(const std::string& id) {
   return id == "wheel_slip" || id == "wheel_radius_error";
 }
 
-using Set = std::vector<std::size_t>;
-struct Scored {
+struct Ranked {
   double log_joint;
-  Set set;
+  Model model;
 };
 
-void keep_best(std::vector<Scored>& scored, std::size_t count) {
-  std::ranges::stable_sort(scored, std::greater(), &Scored::log_joint);
-  if (scored.size() > count) scored.resize(count);
+void sort_best(std::vector<Ranked>& models) {
+  std::ranges::stable_sort(models, std::greater(), &Ranked::log_joint);
 }
 
-// The best sets with one configuration, of up to `most` effects.
-std::vector<Scored> search(const Prior& prior, const View& view, std::optional<std::size_t> configuration,
+// The best sets with one configuration.
+std::vector<Ranked> search(const Prior& prior, const View& view, std::optional<std::size_t> configuration,
                            std::span<const std::size_t> live, double to_beat) {
   const double base = view.log_evidence(configuration);
-  const auto score = [&](Set set, std::span<const double> shares) {
-    return Scored{view.evidence(set, configuration, shares).log_evidence + base, std::move(set)};
+  const auto score = [&](std::vector<std::size_t> set, std::span<const double> shares) {
+    return Ranked{view.evidence(set, configuration, shares).log_evidence + base,
+                  {std::move(set), configuration}};
   };
-  std::vector<Scored> all{{base, {}}}, best;
+  std::vector<Ranked> all{{base, {{}, configuration}}}, best;
+  const auto keep_best = [&](std::size_t count) {
+    sort_best(best);
+    if (best.size() > count) best.resize(count);
+    all.insert(all.end(), best.begin(), best.end());
+  };
   double most = base;
   for (const std::size_t h : live) {
     all.push_back(score({h}, std::array{usual_slab}));
@@ -59,34 +64,23 @@ std::vector<Scored> search(const Prior& prior, const View& view, std::optional<s
     for (std::size_t j = i + 1; j < live.size(); ++j)
       if (!prior.excludes(live[i], live[j])) best.push_back(score({live[i], live[j]}, shares));
   }
-  keep_best(best, kept_pairs);
-  all.insert(all.end(), best.begin(), best.end());
+  keep_best(kept_pairs);
   const std::size_t largest = configuration ? most_effects - 1 : most_effects;
   const std::size_t extended = configuration ? extended_with_function : extended_sets;
   for (std::size_t size = 3; size <= largest && !best.empty(); ++size) {
-    std::set<Set> next;
+    std::set<std::vector<std::size_t>> next;
     for (std::size_t k = 0; k < std::min(extended, best.size()); ++k) {
       for (const std::size_t h : live) {
-        if (std::ranges::none_of(best[k].set, [&](std::size_t q) { return prior.excludes(h, q); }))
-          next.insert(with(best[k].set, h));
+        const std::vector<std::size_t>& set = best[k].model.set;
+        if (std::ranges::none_of(set, [&](std::size_t q) { return prior.excludes(h, q); }))
+          next.insert(with(set, h));
       }
     }
     best.clear();
-    for (const Set& set : next) best.push_back(score(set, shares));
-    keep_best(best, kept_larger);
-    all.insert(all.end(), best.begin(), best.end());
+    for (const auto& set : next) best.push_back(score(set, shares));
+    keep_best(kept_larger);
   }
   return all;
-}
-
-void add_subsets(const Model& model, std::set<std::pair<Set, std::optional<std::size_t>>>& have,
-                 std::vector<Model>& models) {
-  for (std::size_t bits = 0; bits + 1 < (std::size_t{1} << model.set.size()); ++bits) {
-    Model part{{}, model.configuration};
-    for (std::size_t k = 0; k < model.set.size(); ++k)
-      if ((bits >> k & 1) != 0) part.set.push_back(model.set[k]);
-    if (have.insert({part.set, part.configuration}).second) models.push_back(std::move(part));
-  }
 }
 
 }  // namespace
@@ -280,21 +274,13 @@ std::vector<Model> enumerate(const Prior& prior, const Reduced& reduced) {
     const double sd = prior.slab(h, usual_slab_of);
     if (view.precision(h) * sd * sd > not_seen) live.push_back(h);
   }
-  struct Ranked {
-    double log_joint;
-    Model model;
-  };
-  std::vector<Ranked> found;
   double to_beat = 0;
-  const auto add = [&](std::optional<std::size_t> configuration) {
-    for (Scored& s : search(prior, view, configuration, live, to_beat))
-      found.push_back({s.log_joint, {std::move(s.set), configuration}});
-  };
-  add(std::nullopt);
+  std::vector<Ranked> found = search(prior, view, std::nullopt, live, to_beat);
   for (const Ranked& f : found) to_beat = std::max(to_beat, f.model.set.size() <= 1 ? f.log_joint : 0.0);
-  for (std::size_t c = 0; c < prior.configurations().size(); ++c) add(c);
-  std::ranges::stable_sort(found, std::greater(), &Ranked::log_joint);
-  std::set<std::pair<Set, std::optional<std::size_t>>> have;
+  for (std::size_t c = 0; c < prior.configurations().size(); ++c)
+    std::ranges::move(search(prior, view, c, live, to_beat), std::back_inserter(found));
+  sort_best(found);
+  std::set<Model> have;
   std::vector<Model> models;
   // Functions of the best configurations only.
   std::vector<std::optional<std::size_t>> configurations;
@@ -309,10 +295,18 @@ std::vector<Model> enumerate(const Prior& prior, const Reduced& reduced) {
     const bool good =
         k < kept_models &&
         (!m.configuration || std::ranges::find(configurations, m.configuration) != configurations.end());
-    if ((single || good) && have.insert({m.set, m.configuration}).second) models.push_back(m);
+    if ((single || good) && have.insert(m).second) models.push_back(m);
   }
   const std::size_t whole = std::min(models_with_subsets, models.size());
-  for (std::size_t k = 0; k < whole; ++k) add_subsets(Model(models[k]), have, models);
+  for (std::size_t k = 0; k < whole; ++k) {
+    const std::vector<std::size_t> set = models[k].set;
+    for (std::size_t bits = 0; bits + 1 < (std::size_t{1} << set.size()); ++bits) {
+      Model part{{}, models[k].configuration};
+      for (std::size_t q = 0; q < set.size(); ++q)
+        if ((bits >> q & 1) != 0) part.set.push_back(set[q]);
+      if (have.insert(part).second) models.push_back(std::move(part));
+    }
+  }
   return models;
 }
 

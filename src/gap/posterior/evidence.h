@@ -1,5 +1,6 @@
 #pragma once
 
+#include <compare>
 #include <optional>
 
 #include "gap/posterior/gram.h"
@@ -10,6 +11,8 @@ namespace joulecast::gap::posterior {
 struct Model {
   std::vector<std::size_t> set;              // hypotheses, ascending
   std::optional<std::size_t> configuration;  // of a function
+
+  auto operator<=>(const Model&) const = default;
 };
 
 // A function with one width of its prior.

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <optional>
 
-#include "gap/posterior/constancy.h"
 #include "gap/traits.h"
 #include "gap/verdict/words.h"
 #include "statistics/robust.h"

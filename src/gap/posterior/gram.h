@@ -4,8 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "gap/posterior/constants.h"
-#include "gap/posterior/noise.h"
+#include "gap/posterior/equations.h"
 #include "statistics/information.h"
 
 namespace joulecast::gap::posterior {
@@ -13,6 +12,18 @@ namespace joulecast::gap::posterior {
 using statistics::Information;
 
 inline constexpr std::size_t factor_count = tolerance_factors.size();
+
+// The errors of the rows of one channel.
+struct Noise {
+  Eigen::VectorXd weight;  // of each row: inverse variance, less for outliers, over the inflation
+  double inflation = 1;    // of the variance: ratio of the scatter of blocks' scores to that of single rows
+  double sigma = 0;        // median spread of a row, in the channel's unit; 0: the channel is no measurement
+  double rest = 0;         // mean |residual| of the fit of all columns, in the channel's unit
+};
+
+// Estimated from the residuals of a ridge fit of all columns.
+Noise learn_noise(const ChannelRows& rows, const Equations& equations,
+                  const std::vector<Function>& functions);
 
 // Gram matrices of the whitened rows over [E F Z y] of each block: the sufficient statistics of the
 // posterior.

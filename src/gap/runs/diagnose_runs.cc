@@ -40,7 +40,7 @@ class RunDiagnoser {
     if (contradicted != d.checks.end()) return nothing_to_judge(contradicted->says);
     rows_.silence(checked.apart);
     report(0);
-    fit_ = posterior::walk(rows_.data());
+    fit_ = posterior::walk(rows_.data);
     if (!(fit_->noise.back().sigma > 0))
       return nothing_to_judge(
           "The energies follow from the conditions of the runs to the last digit: they were computed, or "
@@ -72,10 +72,10 @@ class RunDiagnoser {
     Diagnosis& d = r_.diagnosis;
     d.robot_id = robot_.robot_id;
     d.missions = d.samples = set_.runs.size();
-    d.motor_channels = rows_.by_motor();
-    d.power = rows_.by_motor() ? PowerSource::motors : PowerSource::battery;
-    r_.model_given = rows_.model_given();
-    r_.model_ratio = rows_.model_ratio();
+    d.motor_channels = rows_.by_motor;
+    d.power = rows_.by_motor ? PowerSource::motors : PowerSource::battery;
+    r_.model_given = rows_.model_given;
+    r_.model_ratio = rows_.model_ratio;
     const std::vector<double> modelled = rows_.modelled_j();
     double all_measured = 0, all_modelled = 0;
     for (std::size_t k = 0; k < set_.runs.size(); ++k) {
@@ -95,7 +95,7 @@ class RunDiagnoser {
     for (std::size_t k = 0; k < set_.runs.size(); ++k) {
       r_.runs[k].after_j = after[k];
       if (std::isfinite(held_out[k])) r_.runs[k].held_out_j = held_out[k];
-      power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
+      power_w += set_.runs[k].measured_j() / rows_.duration_s[k] / static_cast<double>(set_.runs.size());
     }
     // Spreads, corrected for the degrees of freedom of the fit of all columns; the sides come first.
     const auto spread = [&](const posterior::Noise& noise) {
@@ -106,7 +106,7 @@ class RunDiagnoser {
     r_.side_scatter = fit_->noise.size() > 1 ? spread(fit_->noise.front()) : missing;
     d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
     d.channels = {
-        {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+        {rows_.by_motor ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
     state_effects(answer_, power_w, d);
     for (const std::string& reason : answer_.reasons) d.reasons.push_back(sentence(reason));
     state_offer(*fit_, answer_, false, d);
@@ -167,7 +167,7 @@ class RunDiagnoser {
       if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
         limits.push_back(fmt::format("Wrong distances in the table would have the same effect as {}.", e.id));
     }
-    if (!rows_.by_motor())
+    if (!rows_.by_motor)
       limits.emplace_back("The motors were not measured separately: the sides cannot be compared.");
   }
 

@@ -75,17 +75,17 @@ std::vector<std::pair<std::string, double>> conditions_of(const MissionRun& r, s
 
 RunRows::RunRows(const RunSet& set, const robot::RobotModel& robot,
                  std::vector<dynamics::ActiveEffect> in_file)
-    : runs_(set.runs) {
-  posterior::Data& d = data_;
+    : runs(set.runs) {
+  posterior::Data& d = data;
   d.robot = robot;
   d.in_file = std::move(in_file);
   d.covariates = set.covariates;
-  d.missions = runs_.size();
-  d.blocks = std::min(runs_.size(), most_run_blocks);
+  d.missions = runs.size();
+  d.blocks = std::min(runs.size(), most_run_blocks);
   d.power = true;
   d.fewest = fewest_runs_of_channel;
-  fill_covariates(runs_, d.covariates.size());
-  labels_as_covariates(set, runs_, d.covariates);
+  fill_covariates(runs, d.covariates.size());
+  labels_as_covariates(set, runs, d.covariates);
   const dynamics::DriveModel model(robot, d.in_file);
   double given = 0, ours = 0;
   std::vector<double> modelled_j, ratios, side_offset_j;
@@ -94,12 +94,12 @@ RunRows::RunRows(const RunSet& set, const robot::RobotModel& robot,
     rows.first.push_back(rows.instants.size());
     rows.meter.push_back(meter);
   };
-  for (std::size_t k = 0; k < runs_.size(); ++k) {
-    const MissionRun& run = runs_[k];
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const MissionRun& run = runs[k];
     std::vector<Window> instants = run_instants(model, run.at);
     for (Window& w : instants) {
       w.mission = k;
-      w.block = k * d.blocks / runs_.size();
+      w.block = k * d.blocks / runs.size();
       w.covariates = run.covariates;
     }
     add(d.rows, instants, run.by_motor() ? Meter::motors : Meter::battery);
@@ -107,81 +107,80 @@ RunRows::RunRows(const RunSet& set, const robot::RobotModel& robot,
     const RunEnergy own = run_energy(model, run.at);
     const double by_robot_j = run.by_motor() ? own.motor_j[0] + own.motor_j[1] : own.battery_j;
     const bool has_model = !std::isnan(run.given_j());
-    by_motor_ = by_motor_ && run.by_motor();
-    model_given_ = model_given_ && has_model;
-    duration_s_.push_back(own.duration_s);
-    offset_j_.push_back(has_model ? run.given_j() - by_robot_j : 0);
+    by_motor = by_motor && run.by_motor();
+    model_given = model_given && has_model;
+    duration_s.push_back(own.duration_s);
+    offset_j.push_back(has_model ? run.given_j() - by_robot_j : 0);
     side_offset_j.push_back(has_model && run.by_motor() ? run.model_motor_j[0] - run.model_motor_j[1] -
                                                               own.motor_j[0] + own.motor_j[1]
                                                         : 0);
-    modelled_j.push_back(by_robot_j + offset_j_.back());
+    modelled_j.push_back(by_robot_j + offset_j.back());
     ratios.push_back(run.measured_j() / modelled_j.back());
     if (!has_model) continue;
     given += run.given_j();
     ours += by_robot_j;
   }
-  if (ours > 0) model_ratio_ = given / ours;
+  if (ours > 0) model_ratio = given / ours;
   const double usual = statistics::median(ratios);
   d.mean_power_w = 0;
-  for (std::size_t k = 0; k < runs_.size(); ++k) {
+  for (std::size_t k = 0; k < runs.size(); ++k) {
     const bool far = !(std::fabs(std::log(ratios[k] / usual)) < std::log(far_off_ratio));
-    size_j_.push_back(far ? std::fabs(usual * modelled_j[k]) : runs_[k].measured_j());
-    d.mean_power_w += size_j_[k] / duration_s_[k] / static_cast<double>(runs_.size());
+    size_j.push_back(far ? std::fabs(usual * modelled_j[k]) : runs[k].measured_j());
+    d.mean_power_w += size_j[k] / duration_s[k] / static_cast<double>(runs.size());
   }
   std::map<std::string, Eigen::VectorXd> shifts;
-  for (std::size_t k = 0; k < runs_.size(); ++k) {
-    const MissionRun& run = runs_[k];
-    joule_.push_back(size_j_[k] / d.mean_power_w);
-    d.rows.scale.push_back(duration_s_[k] / joule_[k]);
-    d.rows.power_w.push_back((run.measured_j() - offset_j_[k]) / joule_[k]);
+  for (std::size_t k = 0; k < runs.size(); ++k) {
+    const MissionRun& run = runs[k];
+    joule.push_back(size_j[k] / d.mean_power_w);
+    d.rows.scale.push_back(duration_s[k] / joule[k]);
+    d.rows.power_w.push_back((run.measured_j() - offset_j[k]) / joule[k]);
     if (run.by_motor()) {
       d.sides.scale.push_back(d.rows.scale.back());
-      d.sides.power_w.push_back((run.motor_j[0] - run.motor_j[1] - side_offset_j[k]) / joule_[k]);
+      d.sides.power_w.push_back((run.motor_j[0] - run.motor_j[1] - side_offset_j[k]) / joule[k]);
     }
-    shifts.try_emplace(run.table, Eigen::VectorXd::Zero(ix(runs_.size()))).first->second[ix(k)] =
+    shifts.try_emplace(run.table, Eigen::VectorXd::Zero(ix(runs.size()))).first->second[ix(k)] =
         d.mean_power_w;
   }
   for (auto& [table, shift] : shifts)
     if (shifts.size() > 1) d.shifts.push_back(std::move(shift));
-  for (std::size_t c = 0; c < conditions_of(runs_.front(), 0).size(); ++c) {
-    posterior::Condition condition{conditions_of(runs_.front(), 0)[c].first,
-                                   Eigen::VectorXd(ix(runs_.size()))};
-    for (std::size_t k = 0; k < runs_.size(); ++k)
-      condition.value[ix(k)] = conditions_of(runs_[k], k)[c].second;
+  for (std::size_t c = 0; c < conditions_of(runs.front(), 0).size(); ++c) {
+    posterior::Condition condition{conditions_of(runs.front(), 0)[c].first, Eigen::VectorXd(ix(runs.size()))};
+    for (std::size_t k = 0; k < runs.size(); ++k)
+      condition.value[ix(k)] = conditions_of(runs[k], k)[c].second;
     if (condition.value.maxCoeff() > condition.value.minCoeff()) d.conditions.push_back(std::move(condition));
   }
 }
 
 std::vector<double> RunRows::energies_j(const Eigen::VectorXd& power_w) const {
   std::vector<double> out;
-  for (std::size_t k = 0; k < runs_.size(); ++k) out.push_back(joule_[k] * power_w[ix(k)] + offset_j_[k]);
+  for (std::size_t k = 0; k < runs.size(); ++k) out.push_back(joule[k] * power_w[ix(k)] + offset_j[k]);
   return out;
 }
 
 std::vector<double> RunRows::modelled_j() const {
-  return energies_j(posterior::predicted_power(data_, data_.in_file));
+  return energies_j(posterior::predicted_power(data, data.in_file));
 }
 
 double RunRows::missed(std::size_t run, double energy_j) const {
-  const double measured = runs_[run].measured_j();
-  return std::fabs(measured - energy_j) / std::max(measured, size_j_[run]);
+  const double measured = runs[run].measured_j();
+  return std::fabs(measured - energy_j) / std::max(measured, size_j[run]);
 }
 
 RunRows::Regression RunRows::regression() const {
-  const std::vector<double> all(data_.blocks, 1.0);
-  Regression out{energies_j(posterior::plain_regression(data_, all)), {}};
-  for (std::size_t k = 0; k < runs_.size(); ++k)
-    out.apart.push_back((runs_[k].measured_j() - out.energy_j[k]) / size_j_[k]);
+  const std::vector<double> all(data.blocks, 1.0);
+  Regression out{energies_j(posterior::plain_regression(data, all)), {}};
+  for (std::size_t k = 0; k < runs.size(); ++k)
+    out.apart.push_back((runs[k].measured_j() - out.energy_j[k]) / size_j[k]);
   const double spread = std::max(statistics::spread_about_zero(out.apart), least_spread);
   for (double& apart : out.apart) apart /= spread;
   return out;
 }
 
-void RunRows::silence(const std::vector<std::size_t>& runs) {
-  for (const std::size_t k : runs) {
-    joule_[k] /= silent;
-    for (Eigen::VectorXd& shift : data_.shifts) shift[ix(k)] *= silent;
-    for (posterior::PowerRows* rows : {&data_.rows, &data_.sides}) {
+void RunRows::silence(const std::vector<std::size_t>& wrong) {
+  for (const std::size_t k : wrong) {
+    joule[k] /= silent;
+    for (Eigen::VectorXd& shift : data.shifts) shift[ix(k)] *= silent;
+    for (posterior::PowerRows* rows : {&data.rows, &data.sides}) {
       for (std::size_t r = 0; r < rows->size(); ++r)
         if (rows->window(r).mission == k) rows->scale[r] *= silent, rows->power_w[r] *= silent;
     }

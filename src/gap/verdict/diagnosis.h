@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <limits>
@@ -94,7 +95,12 @@ struct Baseline {
   std::vector<std::string> says;  // its terms compared with the model's, as text
   // True if the explanation's error exceeds the better of the others by more than a tenth, or by more than a
   // twentieth and the standard error.
-  bool wins() const;
+  bool wins() const {
+    constexpr double slight = 1.05, clear = 1.1;
+    const double best = std::min(held_out, unchanged_model_held_out);
+    return explanation_held_out > clear * best ||
+           (explanation_held_out > slight * best && explanation_held_out - best > deviation);
+  }
 };
 
 // The gap on held-out parts: effects and strengths are re-estimated without each.
@@ -121,15 +127,18 @@ struct FileCorrection {
 // Origin of the gap's power; `motors`: their V i, without the base load.
 enum class PowerSource { battery, motors, none };
 inline constexpr std::array<std::string_view, 3> power_source_names{"battery", "motors", "none"};
-std::string_view name_of(PowerSource source);
 
 enum class Verdict { none, effects, outside, inconclusive, not_this_robot };
 inline constexpr std::array<std::string_view, 5> verdict_names{"none", "effects", "outside", "inconclusive",
                                                                "not_this_robot"};
 inline constexpr std::array<std::string_view, 5> verdict_titles{
     "no gap", "effects found", "outside the catalogue", "inconclusive", "not this robot"};
-std::string_view name_of(Verdict verdict);
-std::string_view title_of(Verdict verdict);
+constexpr std::string_view name_of(Verdict verdict) {
+  return verdict_names[static_cast<std::size_t>(verdict)];
+}
+constexpr std::string_view title_of(Verdict verdict) {
+  return verdict_titles[static_cast<std::size_t>(verdict)];
+}
 
 // Data of a report's plots; the report computes nothing.
 struct Figures {
@@ -144,11 +153,6 @@ struct Figures {
     std::string axis;
     std::vector<Bin> bins;
   };
-  struct Cell {
-    double x_m = 0, y_m = 0;  // lower corner
-    double before_w = 0, after_w = 0;
-    std::size_t windows = 0;
-  };
   struct Point {
     double t_s = 0, measured_w = 0, before_w = 0, after_w = 0;  // NaN breaks the line
   };
@@ -161,7 +165,7 @@ struct Figures {
   };
   std::vector<Map> maps;
   double cell_m = 0;
-  std::vector<Cell> floor;
+  std::vector<Bin> floor;  // squares with their lower corners at (from, to)
   std::string stretch_of;  // mission of the interval of power over time
   std::vector<Point> power;
   std::vector<Mission> missions;

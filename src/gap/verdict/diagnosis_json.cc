@@ -33,8 +33,30 @@ double probability_of(const Check& check) {
   return std::isfinite(check.probability) ? check.probability : check.error;
 }
 
-const Table<Check>& check_table() {
-  static const auto table =
+// What to inspect for the effect and for each alternative; covariates have no row.
+std::string workshop_of(const DiagnosedEffect& effect) {
+  std::vector<std::string> ids = effect.alternatives;
+  ids.insert(ids.begin(), effect.id);
+  std::string text;
+  for (const std::string& id : ids) {
+    const auto row = std::ranges::find(traits_table, id, &Traits::id);
+    if (row != traits_table.end() && !row->workshop.empty())
+      text.append(text.empty() ? "" : "; ").append(row->workshop);
+  }
+  return text;
+}
+
+// Where nothing was added, before is after.
+Shrinkage shrinkage_of(const Diagnosis& d) {
+  if (d.shrinkage) return *d.shrinkage;
+  const double gap = d.power_absolute_relative;
+  return {.before = gap, .after = gap, .remaining_over_noise_floor = gap / d.noise_floor};
+}
+
+}  // namespace
+
+const Table<Diagnosis>& diagnosis_table() {
+  static const auto check_table =
       Table<Check>()
           .value("id", &Check::id,
                  "such as battery_current_reversed, wheel_velocity_scale, dead_channel, held_samples, "
@@ -56,12 +78,8 @@ const Table<Check>& check_table() {
           .integers("few_missions", &Check::few_missions,
                     "indices of the affected missions, if only few of several are affected")
           .only([](const Check& check) { return !check.few_missions.empty(); });
-  return table;
-}
-
-const Table<Diagnosis>& size_table() {
   using D = Diagnosis;
-  static const auto table =
+  static const auto size_table =
       Table<D>()
           .number_or_null("energy_relative", &D::energy_relative, "(measured - modelled) / measured energy")
           .number_or_null("power_absolute_relative", &D::power_absolute_relative,
@@ -72,35 +90,14 @@ const Table<Diagnosis>& size_table() {
                           "smallest share of the power that an effect must change to be detectable in these "
                           "recordings")
           .later();
-  return table;
-}
-
-const Table<ChannelGap>& channel_table() {
   using C = ChannelGap;
-  static const auto table =
+  static const auto channel_table =
       Table<C>()
           .number_or_null("absolute_relative", &C::absolute_relative,
                           "mean of |measured - modelled| over the mean of |measured|")
           .number_or_null("noise_floor", &C::noise_floor, "part of it that is due to noise");
-  return table;
-}
-
-// What to inspect for the effect and for each alternative; covariates have no row.
-std::string workshop_of(const DiagnosedEffect& effect) {
-  std::vector<std::string> ids = effect.alternatives;
-  ids.insert(ids.begin(), effect.id);
-  std::string text;
-  for (const std::string& id : ids) {
-    const auto row = std::ranges::find(traits_table, id, &Traits::id);
-    if (row != traits_table.end() && !row->workshop.empty())
-      text.append(text.empty() ? "" : "; ").append(row->workshop);
-  }
-  return text;
-}
-
-const Table<DiagnosedEffect>& effect_table() {
   using E = DiagnosedEffect;
-  static const auto table =
+  static const auto effect_table =
       Table<E>()
           .value("id", &E::id, "effect of the catalogue, or covariate:<name>")
           .number_or_null("probability", &E::probability,
@@ -123,12 +120,8 @@ const Table<DiagnosedEffect>& effect_table() {
           .later()
           .text_or_null("workshop", workshop_of, "what to check on the robot")
           .later();
-  return table;
-}
-
-const Table<Outside>& outside_table() {
   using O = Outside;
-  static const auto table =
+  static const auto outside_table =
       Table<O>()
           .number_or_null("probability", &O::probability,
                           "probability of a deviation that no effect of the catalogue describes")
@@ -148,19 +141,8 @@ const Table<Outside>& outside_table() {
               "says", [](const O& o) { return o.channel.empty() ? std::string() : outside_words(o); },
               "the same in a sentence")
           .later();
-  return table;
-}
-
-// Where nothing was added, before is after.
-Shrinkage shrinkage_of(const Diagnosis& d) {
-  if (d.shrinkage) return *d.shrinkage;
-  const double gap = d.power_absolute_relative;
-  return {.before = gap, .after = gap, .remaining_over_noise_floor = gap / d.noise_floor};
-}
-
-const Table<Shrinkage>& shrinkage_table() {
   using S = Shrinkage;
-  static const auto table =
+  static const auto shrinkage_table =
       Table<S>()
           .number_or_null("held_out_before", &S::before,
                           "gap of the parts of the recordings that were not used to find the effects")
@@ -171,10 +153,6 @@ const Table<Shrinkage>& shrinkage_table() {
                           "remaining gap relative to the noise floor")
           .value("parts", &S::parts, "number of parts that were left out, one after the other")
           .later();
-  return table;
-}
-
-const Table<Baseline>& baseline_table() {
   using T = BaselineTerm;
   static const auto term = Table<T>()
                                .number_or_null("value", &T::value, "of the term; null: not determined")
@@ -184,7 +162,7 @@ const Table<Baseline>& baseline_table() {
                                .number_or_null("explained", &T::explained, "the same with the effects found")
                                .later();
   using B = Baseline;
-  static const auto table =
+  static const auto baseline_table =
       Table<B>()
           .map("terms", &B::terms, "of the regression, by name", &T::name, term)
           .number_or_null("held_out", &B::held_out,
@@ -201,50 +179,37 @@ const Table<Baseline>& baseline_table() {
                  "the regression or the robot file predicts better than the effects found, by more than a "
                  "tenth, or by more than a twentieth and one standard error")
           .texts("says", &B::says, "comparison of its terms with those of the model, in sentences");
-  return table;
-}
-
-const Table<TermSum>& sum_table() {
-  using S = TermSum;
-  static const auto table =
-      Table<S>()
-          .texts("of", &S::effects, "effects of this form, closest first")
-          .value("terms", &S::terms, "terms of the regression that show it")
-          .number_or_null("value", &S::difference_w, "measured minus modelled power at the mean motion")
-          .number_or_null("sd", &S::deviation_w, "standard deviation of value")
+  static const auto sum_table =
+      Table<TermSum>()
+          .texts("of", &TermSum::effects, "effects of this form, closest first")
+          .value("terms", &TermSum::terms, "terms of the regression that show it")
+          .number_or_null("value", &TermSum::difference_w, "measured minus modelled power at the mean motion")
+          .number_or_null("sd", &TermSum::deviation_w, "standard deviation of value")
           .value(
-              "unit", [](const S&) { return "W"; }, "of value")
-          .text_or_null("adopts_as", &S::parameter, "parameter of the robot file that could take all of it")
+              "unit", [](const TermSum&) { return "W"; }, "of value")
+          .text_or_null("adopts_as", &TermSum::parameter,
+                        "parameter of the robot file that could take all of it")
           .object(
               "fits",
-              [](const S& s) {
+              [](const TermSum& s) {
                 return DiagnosedParameter{{}, s.unit, s.value, s.deviation};
               },
               "value of that parameter that takes it", value_table())
           .later();
-  return table;
-}
-
-const Table<FileCorrection>& correction_table() {
-  using C = FileCorrection;
-  static const auto table =
-      Table<C>()
-          .value("parameter", &C::parameter, "of the robot file, as motor.friction_torque_nm")
-          .number_or_null("file", &C::file, "value of the robot file")
-          .number_or_null("fits", &C::fits, "value that fits these recordings")
-          .number_or_null("sd", &C::deviation, deviation_words);
-  return table;
-}
-
-const Table<WhereRegion>& where_table() {
+  static const auto correction_table =
+      Table<FileCorrection>()
+          .value("parameter", &FileCorrection::parameter, "of the robot file, as motor.friction_torque_nm")
+          .number_or_null("file", &FileCorrection::file, "value of the robot file")
+          .number_or_null("fits", &FileCorrection::fits, "value that fits these recordings")
+          .number_or_null("sd", &FileCorrection::deviation, deviation_words);
   using W = WhereRegion;
   const auto end = [](double W::*number) {
     return [number](const W& w) {
       return w.label.empty() ? std::variant<double, std::string>(w.*number) : w.label;
     };
   };
-  const Schema either{{"type", {"number", "string", "null"}}};
-  static const auto table =
+  static const Schema either{{"type", {"number", "string", "null"}}};
+  static const auto where_table =
       Table<W>()
           .value("channel", &W::channel, measured_channel)
           .value("variable", &W::variable, "variable by which the channel is divided into regions")
@@ -256,23 +221,13 @@ const Table<WhereRegion>& where_table() {
           .number_or_null("time_share", &W::time_share,
                           "share of the time in the region; with an evenly distributed gap equal to share")
           .later();
-  return table;
-}
-
-const Table<NextDrive>& next_drive_table() {
   using N = NextDrive;
-  static const auto table = Table<N>()
-                                .value("manoeuvre", &N::manoeuvre, "manoeuvre to drive")
-                                .value("separates", &N::separates, "the causes that it distinguishes")
-                                .number_or_null("expected_log_evidence", &N::expected_log_evidence,
-                                                "expected increase of the log evidence");
-  return table;
-}
-
-}  // namespace
-
-const Table<Diagnosis>& diagnosis_table() {
-  using D = Diagnosis;
+  static const auto next_drive_table =
+      Table<N>()
+          .value("manoeuvre", &N::manoeuvre, "manoeuvre to drive")
+          .value("separates", &N::separates, "the causes that it distinguishes")
+          .number_or_null("expected_log_evidence", &N::expected_log_evidence,
+                          "expected increase of the log evidence");
   static const auto table =
       Table<D>("Diagnosis of the gap between a robot and its model, as printed by `joulecast gap --json`")
           .value("robot_id", &D::robot_id, "the robot's id, as in its telemetry and its file")
@@ -288,25 +243,21 @@ const Table<Diagnosis>& diagnosis_table() {
           .value("motor_channels", &D::motor_channels,
                  "false: the diagnosis uses battery power and motion only")
           .later()
-          .word(
-              "power", [](const D& d) { return name_of(d.power); }, power_source_names,
-              "source of the power; motors: of both motors, without the base load")
+          .word("power", &D::power, power_source_names,
+                "source of the power; motors: of both motors, without the base load")
           .later()
-          .list("checks", &D::checks, "faults of the recordings, most fundamental first", check_table())
+          .list("checks", &D::checks, "faults of the recordings, most fundamental first", check_table)
           .later()
-          .object("gap", std::identity(), "difference between measurements and model", size_table())
+          .object("gap", std::identity(), "difference between measurements and model", size_table)
           .map("channels", &D::channels,
                "the gap of each kind of reading: battery_power, motor_power, battery_voltage, yaw_rate",
-               &ChannelGap::channel, channel_table())
+               &ChannelGap::channel, channel_table)
           .later()
-          .word(
-              "verdict", [](const D& d) { return name_of(d.verdict); }, verdict_names,
-              "none: no gap beyond noise; effects: the reported effects explain the gap; outside: a "
-              "deviation that no effect of the catalogue describes; not_this_robot: the file belongs to "
-              "another robot")
-          .word(
-              "verdict_title", [](const D& d) { return title_of(d.verdict); }, verdict_titles,
-              "the verdict in words")
+          .word("verdict", &D::verdict, verdict_names,
+                "none: no gap beyond noise; effects: the reported effects explain the gap; outside: a "
+                "deviation that no effect of the catalogue describes; not_this_robot: the file belongs to "
+                "another robot")
+          .word("verdict_title", &D::verdict, verdict_titles, "the verdict in words")
           .later()
           .number_or_null(
               "verdict_probability", &D::verdict_probability,
@@ -315,25 +266,24 @@ const Table<Diagnosis>& diagnosis_table() {
           .later()
           .texts("reasons", &D::reasons, "evidence against a stronger verdict")
           .later()
-          .list("effects", &D::effects, "largest share first", effect_table())
+          .list("effects", &D::effects, "largest share first", effect_table)
           .object("outside", &D::outside, "deviation that no effect of the catalogue describes",
-                  outside_table())
+                  outside_table)
           .object("shrinkage", shrinkage_of, "reduction of the gap by the findings, on held-out parts",
-                  shrinkage_table())
+                  shrinkage_table)
           .object("baseline", &D::baseline,
                   "a linear regression of power on motion, for comparison; null: no parts could be held out",
-                  baseline_table())
+                  baseline_table)
           .later()
           .list("sums", &D::sums,
-                "differences of power that are certain although several effects have their form", sum_table())
+                "differences of power that are certain although several effects have their form", sum_table)
           .later()
           .list("corrections", &D::corrections, "verdict not_this_robot: a calibration proposal",
-                correction_table())
+                correction_table)
           .later()
-          .list("where", &D::where, "regions in which power departs from the model, worst first",
-                where_table())
+          .list("where", &D::where, "regions in which power departs from the model, worst first", where_table)
           .list("next_drive", &D::next_drive,
-                "manoeuvres that distinguish causes which these recordings leave open", next_drive_table())
+                "manoeuvres that distinguish causes which these recordings leave open", next_drive_table)
           .object("adoption", offer_of, "the proposed adoption and the obstacles to it", offer_table())
           .later()
           .object("figures", &D::figures, "data of the charts; absent: no power was recorded",

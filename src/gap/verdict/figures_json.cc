@@ -51,14 +51,13 @@ const Table<Figures>& figures_table() {
                     {"before_w", &Bin::before_w, before_words},
                     {"after_w", &Bin::after_w, after_words},
                     {"half_width_w", &Bin::half_width_w, "of a 95 % interval of before_w"}});
-  using Cell = F::Cell;
   static const auto floor =
       with_columns(Table<F>().number_or_null("cell_m", &F::cell_m, "side of a square"), &F::floor,
-                   {{"x_m", &Cell::x_m, "lower corners"},
-                    {"y_m", &Cell::y_m, "lower corners"},
-                    {"before_w", &Cell::before_w, before_words},
-                    {"after_w", &Cell::after_w, after_words},
-                    {"windows", &Cell::windows, "number of readings"}});
+                   {{"x_m", &Bin::from, "lower corners"},
+                    {"y_m", &Bin::to, "lower corners"},
+                    {"before_w", &Bin::before_w, before_words},
+                    {"after_w", &Bin::after_w, after_words},
+                    {"windows", &Bin::windows, "number of readings"}});
   using Point = F::Point;
   static const auto power =
       with_columns(Table<F>().value("mission_id", &F::stretch_of, "the mission"), &F::power,

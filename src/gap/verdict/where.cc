@@ -119,40 +119,46 @@ struct Variable {
   std::vector<Region> regions;
 };
 
-std::vector<Variable> variables_of(std::span<const Window> windows, const robot::RobotModel& robot) {
+// A number of each window, in regions and on the axis of a chart.
+struct Axis {
+  const char *variable, *title;
+  std::size_t ranges;  // regions
+  std::function<double(const Window&)> value, drawn;
+};
+
+std::vector<Axis> axes_of(const robot::RobotModel& robot) {
   const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
-  const auto ranges = [&](std::size_t count, const std::function<double(const Window&)>& value) {
-    return ranges_of(windows, value, count);
+  const auto speed = [=](const Window& w) { return 0.5 * r * (w.speed_rad_s[0] + w.speed_rad_s[1]); };
+  const auto acceleration = [=](const Window& w) {
+    return 0.5 * r * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
   };
+  const auto yaw_rate = [=](const Window& w) { return r * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * l); };
+  const auto heading = [](const Window& w) { return std::remainder(w.heading_rad, 2 * std::numbers::pi); };
+  return {{"speed_m_s", "speed, m/s", 6, [=](const Window& w) { return std::fabs(speed(w)); }, speed},
+          {"acceleration_m_s2", "acceleration, m/s²", 6, acceleration, acceleration},
+          {"yaw_rate_rad_s", "yaw rate, rad/s (left positive)", 6, yaw_rate, yaw_rate},
+          {"payload_kg", "payload, kg", 4, &Window::payload_kg, &Window::payload_kg},
+          {"time_s", "time since the mission began, s", 6, &Window::t_s, &Window::t_s},
+          {"heading_rad", "heading, degrees", 8, heading,
+           [=](const Window& w) { return heading(w) * 180 / std::numbers::pi; }}};
+}
+
+std::vector<Variable> variables_of(std::span<const Window> windows, const robot::RobotModel& robot) {
   double side_m = 0;
   std::vector<Region> squares = squares_of(windows, 10, 0.05, side_m);
-  for (Region& one : squares) {
+  for (Region& one : squares)
     one.label = fmt::format("x {:.1f} to {:.1f}, y {:.1f} to {:.1f}", one.from, one.from + side_m, one.to,
                             one.to + side_m);
-    one.from = one.to = 0;
-  }
-  std::vector<Region> phases = phases_of(windows, r);
-  for (Region& one : phases) one.from = one.to = 0;
-  std::vector<Variable> all{
-      {"phase", std::move(phases)},
-      {"speed_m_s",
-       ranges(6, [=](const Window& w) { return 0.5 * r * std::fabs(w.speed_rad_s[0] + w.speed_rad_s[1]); })},
-      {"acceleration_m_s2", ranges(6,
-                                   [=](const Window& w) {
-                                     return 0.5 * r * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
-                                   })},
-      {"yaw_rate_rad_s",
-       ranges(6, [=](const Window& w) { return r * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * l); })},
-      {"payload_kg", ranges(4, [](const Window& w) { return w.payload_kg; })},
-      {"time_s", ranges(6, [](const Window& w) { return w.t_s; })},
-      {"heading_rad",
-       ranges(8, [](const Window& w) { return std::remainder(w.heading_rad, 2 * std::numbers::pi); })},
-      {"floor_m", std::move(squares)}};
+  std::vector<Variable> all{{"phase", phases_of(windows, robot.kinematics.wheel_radius_m)}};
+  for (const Axis& axis : axes_of(robot))
+    all.push_back({axis.variable, ranges_of(windows, axis.value, axis.ranges)});
+  all.push_back({"floor_m", std::move(squares)});
   for (Variable& one : all) std::erase_if(one.regions, [](const Region& g) { return g.windows.size() < 5; });
   return all;
 }
 
-constexpr std::size_t figure_bins = 9, min_figure_windows = 40;
+constexpr std::size_t figure_bins = 9;
+constexpr int min_figure_windows = 40;
 constexpr double stretch_s = 90;  // of power over time
 constexpr int floor_cells = 26;
 constexpr std::size_t fewest_in_cell = 3, fewest_in_bin = 5;
@@ -169,18 +175,11 @@ class Collector {
     }
   }
 
-  Figures::Map map(const std::string& axis, const std::vector<Region>& regions) const {
-    Figures::Map map{axis, {}};
-    for (const Region& region : regions) map.bins.push_back(bin(region));
-    return map;
-  }
-
-  void floor(Figures& figures) const {
-    for (const Region& square : squares_of(windows_, floor_cells, 0.5 / floor_cells, figures.cell_m)) {
-      if (square.windows.size() < fewest_in_cell) continue;
-      const Figures::Bin b = bin(square);
-      figures.floor.push_back({square.from, square.to, b.before_w, b.after_w, b.windows});
-    }
+  std::vector<Figures::Bin> bins(const std::vector<Region>& regions, std::size_t fewest = 0) const {
+    std::vector<Figures::Bin> bins;
+    for (const Region& region : regions)
+      if (region.windows.size() >= fewest) bins.push_back(bin(region));
+    return bins;
   }
 
   // The interval in which the model's power error is largest.
@@ -188,7 +187,7 @@ class Collector {
     std::map<std::pair<std::size_t, int>, double> halves;
     for (std::size_t k = 0; k < windows_.size(); ++k)
       halves[{windows_[k].mission, static_cast<int>(windows_[k].t_s / (stretch_s / 2))}] +=
-          std::fabs(measured_[k] - before_[k]);
+          std::fabs(residual_before_[k]);
     if (halves.empty()) return;
     std::pair<std::size_t, int> worst = halves.begin()->first;
     double most = -1;
@@ -215,10 +214,10 @@ class Collector {
     for (std::size_t k = 0; k < windows_.size(); ++k) {
       Total& t = totals[windows_[k].mission];
       t.measured += measured_[k];
-      t.gap += measured_[k] - before_[k];
-      t.rest += measured_[k] - after_[k];
-      t.absolute += std::fabs(measured_[k] - before_[k]);
-      t.absolute_after += std::fabs(measured_[k] - after_[k]);
+      t.gap += residual_before_[k];
+      t.rest += residual_after_[k];
+      t.absolute += std::fabs(residual_before_[k]);
+      t.absolute_after += std::fabs(residual_after_[k]);
       t.size += std::fabs(measured_[k]);
     }
     for (const auto& [m, t] : totals) {
@@ -261,7 +260,7 @@ class Collector {
 
 std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::RobotModel& robot,
                                   std::span<const double> measured_w, std::span<const double> modelled_w,
-                                  double noise_floor) {
+                                  double noise_floor, const std::string& channel) {
   const std::vector<Variable> variables = variables_of(windows, robot);
   std::vector<double> residual_w;
   double total = 0, size = 0, looks = 0;
@@ -286,7 +285,7 @@ std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::
       const double time_share =
           static_cast<double>(region.windows.size()) / static_cast<double>(windows.size());
       if (std::fabs(sum) < most || std::fabs(share) - time_share < min_where_share) continue;
-      found.push_back({"battery_power",
+      found.push_back({channel,
                        name,
                        region.label,
                        region.from,
@@ -305,33 +304,21 @@ std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::
 Figures figures_of(std::span<const Window> windows, std::span<const double> measured_w,
                    std::span<const double> before_w, std::span<const double> after_w,
                    const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
-  const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
   const Collector collect(windows, measured_w, before_w, after_w);
   Figures figures;
   for (const double w : measured_w) figures.mean_power_w += std::fabs(w);
   figures.mean_power_w /= static_cast<double>(windows.size());
   if (!(figures.mean_power_w > 0)) return figures;
-  figures.maps.push_back(collect.map("phase", phases_of(windows, r)));
-  const std::array<std::pair<const char*, std::function<double(const Window&)>>, 6> variables{
-      {{"speed, m/s", [r](const Window& w) { return 0.5 * r * (w.speed_rad_s[0] + w.speed_rad_s[1]); }},
-       {"acceleration, m/s²",
-        [r](const Window& w) { return 0.5 * r * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]); }},
-       {"yaw rate, rad/s (left positive)",
-        [r, l](const Window& w) { return r * (w.speed_rad_s[0] - w.speed_rad_s[1]) / (2 * l); }},
-       {"payload, kg", [](const Window& w) { return w.payload_kg; }},
-       {"time since the mission began, s", [](const Window& w) { return w.t_s; }},
-       {"heading, degrees", [](const Window& w) {
-          return std::remainder(w.heading_rad, 2 * std::numbers::pi) * 180 / std::numbers::pi;
-        }}}};
-  for (const auto& [axis, value] : variables) {
-    std::size_t known = 0;
-    for (const Window& w : windows) known += std::isfinite(value(w)) ? 1 : 0;
-    if (known < min_figure_windows) continue;
+  figures.maps.push_back({"phase", collect.bins(phases_of(windows, robot.kinematics.wheel_radius_m))});
+  for (const Axis& axis : axes_of(robot)) {
+    const auto known = [&](const Window& w) { return std::isfinite(axis.drawn(w)); };
+    if (std::ranges::count_if(windows, known) < min_figure_windows) continue;
     // The outermost half percent would extend the axis for a few windows.
-    if (const auto ranges = ranges_of(windows, value, figure_bins, 0.005); !ranges.empty())
-      figures.maps.push_back(collect.map(axis, ranges));
+    if (const auto ranges = ranges_of(windows, axis.drawn, figure_bins, 0.005); !ranges.empty())
+      figures.maps.push_back({axis.title, collect.bins(ranges)});
   }
-  collect.floor(figures);
+  figures.floor =
+      collect.bins(squares_of(windows, floor_cells, 0.5 / floor_cells, figures.cell_m), fewest_in_cell);
   collect.power(figures, recordings);
   collect.missions(figures, recordings);
   return figures;

@@ -1,8 +1,8 @@
-#include "gap/diagnose/late_battery.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "gap/diagnose/recordings.h"
 
 namespace joulecast::gap {
 namespace {
@@ -23,7 +23,7 @@ telemetry::Recording rows(std::size_t count) {
 
 TEST(MoveBatteryBack, InterpolatesLaterReadings) {
   telemetry::Recording mission = rows(20);
-  move_battery_back(mission, 0.25);
+  move_back(mission, 0.25, true);
   for (std::size_t k = 0; k < 17; ++k) {
     const auto& s = mission.samples[k];
     EXPECT_NEAR(s.battery_current_a, static_cast<double>(k) + 2.5, 1e-9);
@@ -35,7 +35,7 @@ TEST(MoveBatteryBack, InterpolatesLaterReadings) {
 
 TEST(MoveBatteryBack, ClearsRowsWithoutBatteryReadings) {
   telemetry::Recording mission = rows(20);
-  move_battery_back(mission, -0.2);
+  move_back(mission, -0.2, true);
   for (std::size_t k = 0; k < 2; ++k) EXPECT_TRUE(std::isnan(mission.samples[k].battery_voltage_v));
   for (std::size_t k = 2; k < 20; ++k)
     EXPECT_NEAR(mission.samples[k].battery_current_a, static_cast<double>(k) - 2, 1e-9);
@@ -43,9 +43,9 @@ TEST(MoveBatteryBack, ClearsRowsWithoutBatteryReadings) {
 
 TEST(MoveBatteryBack, AcceptsOneRowOrNone) {
   telemetry::Recording mission = rows(1), none = rows(0);
-  move_battery_back(mission, 0.1);
+  move_back(mission, 0.1, true);
   EXPECT_TRUE(std::isnan(mission.samples[0].battery_current_a));
-  move_battery_back(none, 0.1);
+  move_back(none, 0.1, true);
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "gap/equations/cause.h"
 #include "gap/equations/channels.h"
+#include "gap/posterior/catalogue.h"
 #include "gap/verdict/diagnosis.h"
 #include "tests/plausibility/made_recordings.h"
 

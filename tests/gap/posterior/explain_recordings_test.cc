@@ -6,7 +6,6 @@
 #include <functional>
 #include <random>
 
-#include "gap/posterior/constancy.h"
 #include "robot/robot_file.h"
 #include "tests/gap/posterior/made_robot.h"
 

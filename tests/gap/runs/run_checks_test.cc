@@ -4,7 +4,7 @@
 #include <cmath>
 #include <functional>
 
-#include "gap/equations/cause.h"
+#include "gap/posterior/catalogue.h"
 #include "gap/runs/diagnose_runs.h"
 #include "gap/runs/run_rows.h"
 #include "made_runs.h"
@@ -108,10 +108,10 @@ TEST(RunCovariates, CentresNearZeroCovariates) {
   }
   set.runs[5].covariates = {MissionRun::absent, MissionRun::absent};
   const RunRows rows(set, testing::nomad(), {});
-  const std::vector<Modulation> by = modulations_of(rows.data().rows.instants);
+  const std::vector<Modulation> by = modulations_of(rows.data.rows.instants);
   ASSERT_EQ(by.size(), 3u);
   const auto covariate = [&](std::size_t run, std::size_t index) {
-    return by[index].of(rows.data().rows.window(run));
+    return by[index].of(rows.data.rows.window(run));
   };
   double least = 1, most = 0;
   for (std::size_t k = 0; k < set.runs.size(); ++k) {

@@ -47,7 +47,7 @@ std::vector<WhereRegion> where_of(double missed_w, double noise_floor, const Hol
   std::normal_distribution<double> noise(0, 1);
   std::vector<double> measured;
   for (const Window& w : windows) measured.push_back(modelled_w + (holds(w) ? missed_w : 0) + noise(random));
-  return localise(windows, nomad(), measured, modelled, noise_floor);
+  return localise(windows, nomad(), measured, modelled, noise_floor, "battery_power");
 }
 
 TEST(Localise, FindsTimeInterval) {

@@ -1,11 +1,15 @@
-#include "gap/groups/comparer.h"
+#include "gap/groups/compare.h"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 
+#include "base/try.h"
+#include "gap/diagnose/recordings.h"
 #include "gap/groups/contrast.h"
+#include "gap/runs/run_rows.h"
 #include "gap/verdict/answer.h"
 #include "gap/verdict/words.h"
 
@@ -14,7 +18,16 @@ namespace {
 
 using posterior::ix;
 
+constexpr std::size_t min_group_windows = 20;                                   // of a group
 constexpr double after_base = 0.4, after_contrast = 0.7, after_compared = 0.8;  // of the progress
+
+// The data of a comparison: rows of missions (or runs) in groups (posterior::Data::group).
+struct GroupedData {
+  posterior::Data data;
+  // Of each row of power: J for one of its watts, its part of the way, and energy that is not in its power
+  // [J].
+  std::vector<double> joule, way_m, offset_j;
+};
 
 // Silences variables that are constant within each group: they are equivalent to the group.
 void silence_names_of_groups(posterior::Data& d) {
@@ -115,9 +128,8 @@ class Comparer {
   // Adds the strengths in each group of all effects that were named together: posterior of their contrasts.
   void add_effects() {
     Diagnosis& d = c_.diagnosis;
-    std::vector<std::vector<std::size_t>>
-        own;  // columns of the contrasts of each effect's likeliest hypothesis
-    std::vector<Eigen::Index> all;
+    std::vector<std::vector<Eigen::Index>> own;  // places in `columns` of each effect's contrasts
+    std::vector<Eigen::Index> columns;           // of the contrasts of each effect's likeliest hypothesis
     std::vector<double> sd;
     for (const posterior::ExplainedBy& e : answer_.effects) {
       const std::size_t base = contrasted_.hypothesis[e.hypothesis];
@@ -125,29 +137,26 @@ class Comparer {
       for (std::size_t h = 0; h < contrasted_.hypothesis.size(); ++h) {
         if (contrasted_.hypothesis[h] != base) continue;
         for (const std::size_t k : fit().catalogue.hypotheses[h].columns) {
-          own.back().push_back(all.size());
-          all.push_back(ix(k));
+          own.back().push_back(ix(columns.size()));
+          columns.push_back(ix(k));
           sd.push_back(posterior::slab_shares.back() * fit().equations.columns[k].unit);
         }
       }
     }
     const statistics::Information& information = fit().reduced[fit().factor].information;
-    Eigen::MatrixXd precision = information.xx(all, all);
+    Eigen::MatrixXd precision = information.xx(columns, columns);
     for (std::size_t k = 0; k < sd.size(); ++k) precision(ix(k), ix(k)) += 1 / (sd[k] * sd[k]);
     const Eigen::MatrixXd covariance = precision.inverse();
-    const Eigen::VectorXd strengths = covariance * information.xy(all);
-    std::vector<std::size_t> columns;
-    for (const Eigen::Index k : all) columns.push_back(posterior::ux(k));
+    const Eigen::VectorXd strengths = covariance * information.xy(columns);
     for (std::size_t n = 0; n < d.effects.size(); ++n) {
-      std::vector<Eigen::Index> part(own[n].begin(), own[n].end());
-      std::vector<std::size_t> of_all;
-      for (const std::size_t k : own[n]) of_all.push_back(columns[k]);
-      add_effect(of_all, strengths(part), covariance(part, part), d.effects[n]);
+      std::vector<Eigen::Index> of_effect;
+      for (const Eigen::Index k : own[n]) of_effect.push_back(columns[posterior::ux(k)]);
+      add_effect(of_effect, strengths(own[n]), covariance(own[n], own[n]), d.effects[n]);
     }
   }
 
   // `columns`: contrast by contrast, each with the components of the strength.
-  void add_effect(std::span<const std::size_t> columns, const Eigen::VectorXd& strengths,
+  void add_effect(std::span<const Eigen::Index> columns, const Eigen::VectorXd& strengths,
                   const Eigen::MatrixXd& covariance, DiagnosedEffect& effect) {
     const std::size_t contrasts = contrasted_.contrasts.count(), components = columns.size() / contrasts;
     // Strengths of groups from strengths of contrasts.
@@ -160,7 +169,7 @@ class Comparer {
     }
     Eigen::VectorXd moved_w = Eigen::VectorXd::Zero(fit().equations.moved.rows());
     for (std::size_t k = 0; k < columns.size(); ++k)
-      moved_w += strengths[ix(k)] * fit().equations.moved.col(ix(columns[k]));
+      moved_w += strengths[ix(k)] * fit().equations.moved.col(columns[k]);
     const std::vector<double> energy =
         fit().data.power ? per_m(moved_w, false) : std::vector<double>(groups_, missing);
     ComparedEffect& e = c_.effects.emplace_back();
@@ -226,8 +235,7 @@ class Comparer {
   posterior::Explained answer_;
 };
 
-}  // namespace
-
+// Returns the group of each item by its name, and sets the names of the comparison's groups.
 std::vector<std::size_t> name_groups(std::span<const std::string> group_of_item, Comparison& comparison) {
   const std::set<std::string> names(group_of_item.begin(), group_of_item.end());
   for (const std::string& name : names) comparison.groups.emplace_back().name = name;
@@ -237,8 +245,111 @@ std::vector<std::size_t> name_groups(std::span<const std::string> group_of_item,
   return groups;
 }
 
-void compare_groups(GroupedData grouped, const Progress& progress, Comparison& comparison) {
-  Comparer(std::move(grouped), progress, comparison).run();
+}  // namespace
+
+Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& recordings, const std::string& by) {
+  std::vector<std::string> groups;
+  for (const telemetry::Recording& mission : recordings.missions) {
+    const std::string& id = mission.mission_id;
+    if (by == "prefix") {
+      groups.push_back(id.substr(0, id.find('-')));
+      continue;
+    }
+    if (by == "suffix") {
+      const auto at = id.rfind('_');
+      groups.push_back(at == std::string::npos ? id : id.substr(at + 1));
+      continue;
+    }
+    std::map<std::string, double> held_s;
+    for (const signals::CovariateSeries& series : mission.covariates) {
+      if (!series.name.starts_with(by + "=")) continue;
+      for (std::size_t k = 0; k < series.value.size(); ++k) {
+        const std::int64_t until =
+            k + 1 < series.utime_us.size() ? series.utime_us[k + 1] : mission.samples.back().utime_us;
+        if (series.value[k] == 1)
+          held_s[series.name.substr(by.size() + 1)] += 1e-6 * static_cast<double>(until - series.utime_us[k]);
+      }
+    }
+    if (held_s.empty()) return invalid("--compare-by", "mission " + id + " has no label " + by);
+    groups.push_back(std::ranges::max_element(held_s, {}, [](const auto& h) { return h.second; })->first);
+  }
+  return groups;
+}
+
+Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
+                                      std::span<const std::string> group_of_mission,
+                                      const robot::RobotModel& file, const Progress& progress) {
+  Comparison c;
+  robot::RobotModel robot = file;
+  std::vector<std::size_t> groups = name_groups(group_of_mission, c);
+  if (c.groups.size() < 2)
+    return invalid("log", "contains missions of one group only; a comparison needs two");
+  telemetry::RecordingSet trusted = recordings;
+  Diagnosis& d = c.diagnosis;
+  d.checks = check_and_correct(trusted, robot);
+  // Steps from one mission to the next are the subject of the comparison.
+  std::erase_if(d.checks, [](const Check& check) { return check.id == "step_between_missions"; });
+  TRY_ASSIGN(auto data, posterior::make_data(trusted.missions, robot));
+  data.group = std::move(groups);
+  std::vector<std::size_t> count(c.groups.size(), 0);
+  for (const Window& w : data.windows) ++count[data.group[w.mission]];
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    if (count[k] < min_group_windows)
+      return invalid("log", "contains too little motion of group " + c.groups[k].name);
+  }
+  if (!data.power && !data.motors && !data.voltages)
+    return invalid("log", "measures neither power nor voltage nor current of the motors");
+  for (std::size_t m = 0; m < data.group.size(); ++m) {
+    ++c.groups[data.group[m]].missions;
+    c.groups[data.group[m]].samples += trusted.missions[m].samples.size();
+  }
+  d.robot_id = trusted.robot_id;
+  d.missions = trusted.missions.size();
+  d.samples = trusted.samples;
+  d.notes = trusted.notes;
+  d.motor_channels = data.motors;
+  d.power = power_source(data);
+  if (!data.power)
+    c.limits.emplace_back(
+        "Neither battery nor motor power was recorded: the cost of the differences in watts, and all losses "
+        "between battery and motors, are undetermined.");
+  if (!data.motors)
+    c.limits.emplace_back("Without the motors' currents friction, motors and drivers share one equation.");
+  c.limits.emplace_back(
+      "Groups may differ in more than their names: payload, tyres, batteries, weather of the day.");
+  // Rows are equally long.
+  const Eigen::VectorXd speed = data.rows.mean(
+      [&](const Window& w) { return windows::plain_terms(w, robot.kinematics.wheel_radius_m)[1]; });
+  GroupedData grouped{std::move(data), {}, {speed.begin(), speed.end()}, {}};
+  grouped.joule.assign(grouped.way_m.size(), 1);
+  grouped.offset_j.assign(grouped.way_m.size(), 0);
+  Comparer(std::move(grouped), progress, c).run();
+  return c;
+}
+
+Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> group_of_run,
+                                const robot::RobotModel& robot, const Progress& progress) {
+  TRY_ASSIGN(auto in_file, dynamics::active_effects(robot));
+  Comparison c;
+  const std::vector<std::size_t> groups = name_groups(group_of_run, c);
+  if (c.groups.size() < 2) return invalid("--compare-by", "gives one group only; two are needed to compare");
+  RunRows rows(set, robot, std::move(in_file));
+  RunChecks checked = check_runs(rows, robot);
+  c.diagnosis.checks = std::move(checked.checks);
+  rows.silence(checked.apart);
+  GroupedData grouped{rows.data, rows.joule, {}, rows.offset_j};
+  for (const std::size_t group : groups) ++c.groups[group].missions, ++c.groups[group].samples;
+  grouped.data.group = groups;
+  for (const MissionRun& run : set.runs) grouped.way_m.push_back(run.at.distance_m);
+  Diagnosis& d = c.diagnosis;
+  d.robot_id = robot.robot_id;
+  d.missions = d.samples = set.runs.size();
+  d.motor_channels = rows.by_motor;
+  d.power = d.motor_channels ? PowerSource::motors : PowerSource::battery;
+  c.limits.emplace_back(
+      "Groups may differ in more than their names: day, payload, tyres, batteries, weather.");
+  Comparer(std::move(grouped), progress, c).run();
+  return c;
 }
 
 }  // namespace joulecast::gap
