@@ -205,12 +205,9 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
 std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   std::vector<Check> checks;
   for (const telemetry::DroppedReadings& dropped : telemetry::drop_impossible(recordings.missions, robot))
-    checks.push_back({"impossible_readings",
-                      dropped.channel,
-                      static_cast<double>(dropped.samples),
-                      {not_known, not_known},
-                      fmt::format("{} of {} samples count as not measured: {}.", dropped.samples,
-                                  recordings.samples, dropped.why)});
+    add_check(checks, "impossible_readings", dropped.channel, {static_cast<double>(dropped.samples)}, false,
+              "{} of {} samples count as not measured: {}.", dropped.samples, recordings.samples,
+              dropped.why);
   return checks;
 }
 

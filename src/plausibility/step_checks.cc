@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string>
@@ -102,23 +103,22 @@ std::map<std::string, Series> series_of(const CheckContext& c) {
 
 void check_steps(const CheckContext& c, Checks& checks) {
   double strongest = 0;
-  Check check;
+  Checks found;
   for (const auto& [name, series] : series_of(c)) {
     const auto step = find_step(series.level);
     if (!step || std::fabs(step->change.value) / step->change.sd <= strongest) continue;
     strongest = std::fabs(step->change.value) / step->change.sd;
     const std::size_t first = series.mission[step->first], last = series.mission[step->first - 1];
-    Checks one;
+    found.clear();
     add_check(
-        one, "step_between_missions", series.channel, step->change, false,
+        found, "step_between_missions", series.channel, step->change, false,
         "From mission {} on, {} {:.4g} times the file's; until {} {:.4g} times ({:+.1f} %): diagnose the "
         "missions before and after separately.",
         c.seen[first].mission_id, name, step->after, c.seen[last].mission_id, step->before,
         100 * step->change.value)
         .first_mission = first;
-    check = one.front();
   }
-  if (strongest > 0) checks.push_back(std::move(check));
+  std::ranges::move(found, std::back_inserter(checks));
 }
 
 std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,

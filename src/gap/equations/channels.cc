@@ -119,10 +119,6 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
   return {battery, motor[0] + motor[1], motor};
 }
 
-void keep_known_motion(std::vector<Window>& windows) {
-  std::erase_if(windows, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
-}
-
 template <class S>
 ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w, bool no_currents) {
   const auto& p = model.parameters();

@@ -51,9 +51,6 @@ extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
                                                         const Window&, bool);
 
-// Removes windows with unknown motion.
-void keep_known_motion(std::vector<Window>& windows);
-
 // The battery power that the motion needs, as the robot's meter would read it, and the electrical power of
 // both motors as their sensors would read it [W].
 template <class S>

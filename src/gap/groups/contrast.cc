@@ -171,8 +171,7 @@ class Contraster {
     for (ChannelRows& rows : e.channels) rows.y -= rows.x * own(rows.columns);
     e.modelled_w += e.moved * own.head(ix(e.effects));
     fit.unchanged_w = e.modelled_w;
-    if (!fit.data.power) return;
-    fit.gap = (fit.data.rows.measured_w() - fit.unchanged_w).cwiseAbs().mean() / fit.data.mean_power_w;
+    if (fit.data.power) fit.gap = posterior::missed(fit.data, fit.unchanged_w);
   }
 
   const Fit& base_;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "gap/traits.h"
 #include "statistics/bootstrap.h"
@@ -137,10 +136,7 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
 
 Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member) {
   const Equations& e = fit.equations;
-  // Functions are left out.
-  std::vector<Eigen::Index> keep(e.size());
-  std::iota(keep.begin(), keep.end(), Eigen::Index{0});
-  std::erase_if(keep, [&](Eigen::Index k) { return k >= ix(e.effects) && k < ix(e.effects + e.functions); });
+  const std::vector<Eigen::Index> keep = without_functions(e);
   std::vector<Information> blocks;
   for (const Information& block : fit.grams.raw) blocks.push_back(subset(block, keep));
   const Eigen::VectorXd tolerance = tolerances(e, tolerance_factors[0])(keep);

@@ -190,7 +190,8 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.sample_s = readings.row_s;
   d.windows = windows::make_windows(missions, robot, readings,
                                     {.electrical_delay_s = electrical_delay_s, .most_windows = most_windows});
-  keep_known_motion(d.windows);
+  std::erase_if(d.windows,
+                [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
   const auto whole = [](const Window& w) { return w.reading || windows::steady(w); };
   if (static_cast<std::size_t>(std::ranges::count_if(d.windows, whole)) < fewest_windows)
     return fail(Fault::invalid, "", "too little known motion");

@@ -281,7 +281,7 @@ class Explainer {
     Eigen::VectorXd strengths = mean_strengths(fit_, fit_.once());
     if (fit_.data.power) {
       const Step step = damped_step(fit_, strengths, fit_.once());
-      if (missed(fit_, strengths) > step.missed + clear_gain) strengths = step.strengths;
+      if (missed(fit_.data, power_of(fit_, strengths)) > step.missed + clear_gain) strengths = step.strengths;
     }
     for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k)
       if (at_bound_at(strengths, k)) strengths[ix(k)] = 0;
@@ -298,7 +298,8 @@ class Explainer {
       }
     }
     const HeldOut& h = a_.held_out;
-    a_.adopts = h.known && removed_interval(h.blocks)[0] > 0 && missed(fit_, strengths) < fit_.gap;
+    a_.adopts = h.known && removed_interval(h.blocks)[0] > 0 &&
+                missed(fit_.data, power_of(fit_, strengths)) < fit_.gap;
     if (fit_.data.power) move_covariates(strengths);
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
@@ -327,7 +328,9 @@ class Explainer {
     else if (!a_.effects.empty() && summary_.outside > considered)
       v = Verdict::outside;
     a_.probability = v == Verdict::none ? summary_.none : 0;
-    if (v == Verdict::outside) v = function_predicts() ? v : without_function();
+    // A function that does not predict is no evidence against effects that do.
+    if (v == Verdict::outside && !function_predicts())
+      v = surest() >= named ? Verdict::effects : Verdict::inconclusive;
     const bool mismatched =
         h.known && (a_.factors.back() > named || h.file - h.explanation > mismatched_file);
     // A function of the motion is then the file's: of speed, acceleration or turning.
@@ -370,9 +373,6 @@ class Explainer {
     for (const ExplainedBy& e : a_.effects) most = std::max(most, e.probability);
     return most;
   }
-
-  // A function that does not predict is no evidence against effects that do.
-  Verdict without_function() { return surest() >= named ? Verdict::effects : Verdict::inconclusive; }
 
   // Practical equivalence: the joint reduction by effects and functions on held-out data is less than a gap
   // worth a name, or effects predict power worse than the file and the regression no better; and no effect is
@@ -464,17 +464,6 @@ Explained explain(const Fit& fit) {
   }
   std::ranges::stable_sort(answer.effects, std::greater(), &ExplainedBy::probability);
   return answer;
-}
-
-std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double mean_power_w) {
-  std::vector<DiagnosedEffect> effects;
-  if (answer.verdict == Verdict::none) return effects;
-  for (const ExplainedBy& found : answer.effects) {
-    if (found.group < (answer.verdict == Verdict::effects ? named : least_listed)) continue;
-    effects.push_back(found);
-    effects.back().power_w = found.power_share * mean_power_w;
-  }
-  return effects;
 }
 
 }  // namespace joulecast::gap::posterior

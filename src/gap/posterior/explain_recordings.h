@@ -5,7 +5,6 @@
 
 #include "gap/posterior/bagging.h"
 #include "gap/posterior/hold_out.h"
-#include "gap/posterior/terms.h"
 #include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap::posterior {
@@ -42,9 +41,5 @@ struct Explained {
 
 // The answer at the point that the walk reached, with the effects that other witnesses name.
 Explained explain(const Fit& fit);
-
-// Returns the effects that a diagnosis reports: with the verdict effects only named ones, with the verdict
-// none none. `mean_power_w` is of the recordings.
-std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double mean_power_w);
 
 }  // namespace joulecast::gap::posterior

@@ -148,6 +148,13 @@ Eigen::VectorXd tolerances(const Equations& e, double factor) {
   return sd;
 }
 
+std::vector<Eigen::Index> without_functions(const Equations& e) {
+  std::vector<Eigen::Index> keep(e.size());
+  std::iota(keep.begin(), keep.end(), Eigen::Index{0});
+  keep.erase(keep.begin() + ix(e.effects), keep.begin() + ix(e.effects + e.functions));
+  return keep;
+}
+
 Information weighted_sum(std::span<const Information> blocks, std::span<const double> weights) {
   Information sum;
   for (std::size_t b = 0; b < blocks.size(); ++b) {

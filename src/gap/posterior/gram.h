@@ -41,6 +41,9 @@ Grams make_grams(const Equations& equations, std::span<const Noise> noise, std::
 // Standard deviations of the coefficients of every robot at this factor.
 Eigen::VectorXd tolerances(const Equations& equations, double factor);
 
+// Columns of effects and nuisances.
+std::vector<Eigen::Index> without_functions(const Equations& equations);
+
 // Weighted sum over blocks.
 Information weighted_sum(std::span<const Information> blocks, std::span<const double> weights);
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 
-#include "gap/posterior/terms.h"
 #include "statistics/bootstrap.h"
 #include "statistics/regression.h"
 
@@ -74,26 +73,6 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
   return out;
 }
 
-// Power by the regression, fitted to the rows of blocks in use, for all rows.
-Eigen::VectorXd regressed(const Data& d, const TermColumns& terms, std::span<const double> weights) {
-  const std::vector<std::size_t> of_row = d.rows.blocks();
-  std::vector<Eigen::Index> trained;
-  std::vector<std::size_t> block;
-  for (std::size_t r = 0; r < of_row.size(); ++r)
-    if (weights[of_row[r]] != 0) trained.push_back(ix(r)), block.push_back(of_row[r]);
-  const Eigen::VectorXd measured = d.rows.measured_w();
-  Eigen::MatrixXd x = terms.x(trained, Eigen::all);
-  // A term that these rows contain by rounding alone has no coefficient.
-  for (Eigen::Index k = 0; k < x.cols(); ++k)
-    if (x.col(k).norm() < rounding * terms.x.col(k).norm()) x.col(k).setZero();
-  return terms.x * statistics::robust_regression(x, measured(trained), block, terms.nonnegative).coefficients;
-}
-
-// Power by effects and calibration, for all rows of power: a step from the point of the walk.
-Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<const double> weights) {
-  return damped_step(fit, p.effects.head(ix(fit.equations.effects)), weights).power_w;
-}
-
 // Errors in one channel, summed over the rows left out so far.
 struct Errors {
   double file = 0, effects = 0, all = 0, rows = 0;
@@ -161,12 +140,6 @@ void add(const Equations& equations, const ChannelRows& rows, const Noise& noise
   }
 }
 
-// The residual of a channel that corresponds to all of the mean power; 0: no such residual.
-double power_unit(const Fit& fit, Channel channel) {
-  const auto same = std::ranges::find(fit.functions, channel, &Function::channel);
-  return same == fit.functions.end() ? 0 : same->unit;
-}
-
 double removed_part(std::span<const HeldOut::Block> blocks, std::span<const int> draw) {
   double before = 0, after = 0;
   for (std::size_t k = 0; k < draw.size(); ++k)
@@ -187,8 +160,18 @@ std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks) {
       blocks.size(), [&](std::span<const int> draw) { return removed_part(blocks, draw); });
 }
 
-Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights) {
-  return regressed(data, term_columns(data), weights);
+Eigen::VectorXd plain_regression(const Data& d, const TermColumns& terms, std::span<const double> weights) {
+  const std::vector<std::size_t> of_row = d.rows.blocks();
+  std::vector<Eigen::Index> trained;
+  std::vector<std::size_t> block;
+  for (std::size_t r = 0; r < of_row.size(); ++r)
+    if (weights[of_row[r]] != 0) trained.push_back(ix(r)), block.push_back(of_row[r]);
+  const Eigen::VectorXd measured = d.rows.measured_w();
+  Eigen::MatrixXd x = terms.x(trained, Eigen::all);
+  // A term that these rows contain by rounding alone has no coefficient.
+  for (Eigen::Index k = 0; k < x.cols(); ++k)
+    if (x.col(k).norm() < rounding * terms.x.col(k).norm()) x.col(k).setZero();
+  return terms.x * statistics::robust_regression(x, measured(trained), block, terms.nonnegative).coefficients;
 }
 
 HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,
@@ -225,14 +208,14 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     for (std::size_t r = 0; r < n; ++r)
       if (fold_of(d.rows.window(r).block) == k) tested.push_back(ix(r));
     if (tested.empty()) continue;
-    const Eigen::VectorXd power_w = explained_power(fit, p, weights);
+    const Eigen::VectorXd power_w = damped_step(fit, p.effects.head(ix(e.effects)), weights).power_w;
     out.explained_w(tested) = power_w(tested);
     const double few = static_cast<double>(d.fewest);
     if (static_cast<double>(tested.size()) < least_tested_rows * few ||
         static_cast<double>(n - tested.size()) < least_trained_rows * few)
       continue;
     const Eigen::VectorXd explained = measured - power_w;
-    const Eigen::VectorXd by_terms = measured - regressed(d, terms, weights);
+    const Eigen::VectorXd by_terms = measured - plain_regression(d, terms, weights);
     for (const Eigen::Index r : tested) {
       HeldOut::Block& own = blocks[d.rows.window(ux(r)).block];
       own.file += std::fabs(before[r]);
@@ -278,8 +261,9 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   for (std::size_t c = 0; c < errors.size(); ++c) {
     if (e.channels[c].channel == Channel::power && errors[c].left.size() == ix(n))
       out.repeats_left = repeated_part(d, errors[c].left);
-    const double unit = power_unit(fit, e.channels[c].channel);
-    if (errors[c].rows == 0 || unit == 0) continue;
+    const auto same = std::ranges::find(fit.functions, e.channels[c].channel, &Function::channel);
+    if (errors[c].rows == 0 || same == fit.functions.end()) continue;
+    const double unit = same->unit;  // the residual that corresponds to all of the mean power
     const double removed = (errors[c].file - errors[c].all) / (errors[c].rows * unit);
     if (channels++ > 0 && removed <= out.removed) continue;
     out.removed = removed;

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "gap/posterior/bagging.h"
+#include "gap/posterior/terms.h"
 
 namespace joulecast::gap::posterior {
 
@@ -33,8 +34,8 @@ std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks);
 // Part of the resamples of the blocks in which the explanation has a smaller error than the file.
 double chance_of_benefit(std::span<const HeldOut::Block> blocks);
 
-// Returns the power of the linear regression by row, fitted to blocks with a weight.
-Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
+// Returns the power of the linear regression on these terms by row, fitted to blocks with a weight.
+Eigen::VectorXd plain_regression(const Data& data, const TermColumns& terms, std::span<const double> weights);
 
 // Strengths of the effects with the calibration, averaged over the models without a function.
 Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights);

@@ -87,9 +87,8 @@ Parts parts_of(const Fit& fit) {
   return {std::move(own), std::move(with)};
 }
 
-double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
-  const Eigen::VectorXd measured = fit.data.rows.measured_w();
-  return (measured - power_of(fit, strengths)).cwiseAbs().mean() / fit.data.mean_power_w;
+double missed(const Data& data, const Eigen::VectorXd& power_w) {
+  return (data.rows.measured_w() - power_w).cwiseAbs().mean() / data.mean_power_w;
 }
 
 Step damped_step(const Fit& fit, const Eigen::VectorXd& target, std::span<const double> weights) {
@@ -118,9 +117,8 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
   Eigen::VectorXd point = Eigen::VectorXd::Zero(ix(fit->catalogue.columns.size()));
   fit->gap = 1;
   if (fit->data.power) {
-    const Eigen::VectorXd measured = fit->data.rows.measured_w();
     fit->unchanged_w = predicted_power(fit->data, fit->data.in_file);
-    fit->gap = (measured - fit->unchanged_w).cwiseAbs().mean() / fit->data.mean_power_w;
+    fit->gap = missed(fit->data, fit->unchanged_w);
   }
   std::vector<std::size_t> last_set;
   Parts last;
@@ -149,7 +147,7 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
       continue;
     }
     Step step = damped_step(*fit, target, fit->once());
-    if (!(step.missed < improved * missed(*fit, point))) break;
+    if (!(step.missed < improved * missed(fit->data, power_of(*fit, point)))) break;
     point = std::move(step.strengths);
   }
   return fit;

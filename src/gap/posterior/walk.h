@@ -54,8 +54,8 @@ struct Parts {
 };
 Parts parts_of(const Fit& fit);
 
-// Mean |measured - modelled| of power at these strengths of the effects, over mean power.
-double missed(const Fit& fit, const Eigen::VectorXd& strengths);
+// Mean |measured - modelled| of power by row, over mean power.
+double missed(const Data& data, const Eigen::VectorXd& power_w);
 
 // Strengths on the way from the point of the equations to others, the power there by row, and its error.
 struct Step {

@@ -4,7 +4,6 @@
 #include <ranges>
 
 #include "gap/posterior/hold_out.h"
-#include "gap/posterior/terms.h"
 #include "gap/runs/run_rows.h"
 #include "gap/verdict/words.h"
 #include "plausibility/evaluation.h"

@@ -168,7 +168,7 @@ double RunRows::missed(std::size_t run, double energy_j) const {
 
 RunRows::Regression RunRows::regression() const {
   const std::vector<double> all(data.blocks, 1.0);
-  Regression out{energies_j(posterior::plain_regression(data, all)), {}};
+  Regression out{energies_j(posterior::plain_regression(data, posterior::term_columns(data), all)), {}};
   for (std::size_t k = 0; k < runs.size(); ++k)
     out.apart.push_back((runs[k].measured_j() - out.energy_j[k]) / size_j[k]);
   const double spread = std::max(statistics::spread_about_zero(out.apart), least_spread);

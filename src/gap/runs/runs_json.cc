@@ -5,25 +5,19 @@
 #include "gap/verdict/diagnosis_json.h"
 
 namespace joulecast::gap {
-namespace {
 
-using described::Table;
-
-const Table<JudgedRun>& run_table() {
+nlohmann::ordered_json runs_to_json(const RunDiagnosis& diagnosis) {
+  using described::Table;
   using J = JudgedRun;
-  static const auto table =
+  static const auto run =
       Table<J>()
           .value("run", AT(run.name), "name of the run")
           .value("table", AT(run.table), "name of its table")
           .number_or_null(
-              "measured_j", [](const J& run) { return run.run.measured_j(); }, "measured energy")
+              "measured_j", [](const J& judged) { return judged.run.measured_j(); }, "measured energy")
           .number_or_null("model_j", &J::model_j, "energy by the model")
           .number_or_null("with_effects_j", &J::after_j, "the same with the effects found")
           .number_or_null("held_out_j", &J::held_out_j, "the same with the effects found without this run");
-  return table;
-}
-
-const Table<RunDiagnosis>& runs_table() {
   using R = RunDiagnosis;
   static const auto model =
       Table<R>()
@@ -41,14 +35,8 @@ const Table<RunDiagnosis>& runs_table() {
           .object("model", std::identity(), "the model that was diagnosed", model)
           .object("scatter", std::identity(), "differences between runs that no effect explains", scatter)
           .texts("limits", &R::limits, "limits of these energies, in sentences")
-          .list("runs", &R::runs, "the runs, one by one", run_table());
-  return table;
-}
-
-}  // namespace
-
-nlohmann::ordered_json runs_to_json(const RunDiagnosis& diagnosis) {
-  return runs_table().document(diagnosis);
+          .list("runs", &R::runs, "the runs, one by one", run);
+  return table.document(diagnosis);
 }
 
 }  // namespace joulecast::gap

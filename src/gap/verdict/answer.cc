@@ -60,7 +60,13 @@ void state_effects(const Explained& answer, double mean_power_w, Diagnosis& d) {
   d.verdict = answer.verdict;
   d.verdict_probability = answer.probability;
   d.detectable_share = answer.detectable;
-  d.effects = posterior::reported_effects(answer, mean_power_w);
+  d.effects.clear();
+  for (const posterior::ExplainedBy& found : answer.effects) {
+    const double least = d.verdict == Verdict::effects ? posterior::named : posterior::least_listed;
+    if (d.verdict == Verdict::none || found.group < least) continue;
+    d.effects.push_back(found);
+    d.effects.back().power_w = found.power_share * mean_power_w;
+  }
   d.outside = answer.outside;
   if (d.verdict == Verdict::outside || d.outside.probability >= posterior::named) return;
   d.outside.channel.clear();

@@ -115,14 +115,6 @@ std::vector<Window> driven(const robot::RobotModel& robot, const std::vector<Leg
   return windows;
 }
 
-// Columns of effects and nuisances: manoeuvres have no functions.
-std::vector<Eigen::Index> without_functions(const posterior::Equations& e) {
-  std::vector<Eigen::Index> keep;
-  for (std::size_t k = 0; k < e.size(); ++k)
-    if (k < e.effects || k >= e.effects + e.functions) keep.push_back(posterior::ix(k));
-  return keep;
-}
-
 // The information of a manoeuvre on these columns, with the noise of the recordings.
 statistics::Information expected_information(const posterior::Fit& fit, const std::vector<Window>& windows) {
   posterior::Data drive;
@@ -197,7 +189,7 @@ std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<
   const auto find = [&](const std::string& id) {
     return std::ranges::find_if(all, [&](const Hypothesis& h) { return h.id() == id && h.is_effect(); });
   };
-  const std::vector<Eigen::Index> keep = without_functions(fit.equations);
+  const std::vector<Eigen::Index> keep = posterior::without_functions(fit.equations);
   const Eigen::VectorXd tolerance =
       posterior::tolerances(fit.equations, posterior::tolerance_factors[fit.factor])(keep);
   const statistics::Information total =

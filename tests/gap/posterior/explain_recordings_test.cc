@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "gap/verdict/answer.h"
 #include "robot/robot_file.h"
 #include "tests/gap/posterior/made_robot.h"
 
@@ -136,7 +137,9 @@ TEST(ReportedEffects, OmitsPartsOfOneResample) {
   }
   const auto reported = [&](Verdict verdict) {
     a.verdict = verdict;
-    return reported_effects(a, 100).size();
+    Diagnosis d;
+    state_effects(a, 100, d);
+    return d.effects.size();
   };
   EXPECT_EQ(reported(Verdict::none), 0U);
   EXPECT_EQ(reported(Verdict::effects), 1U);

@@ -115,7 +115,7 @@ TEST(PlainRegression, IgnoresTermsOfRounding) {
     d.rows.first.push_back(r + 1);
     d.rows.power_w.push_back(10 + 5 * speed + (r % 4 < 2 ? 0.1 : -0.1));
   }
-  const Eigen::VectorXd predicted = plain_regression(d, std::vector<double>{0, 1});
+  const Eigen::VectorXd predicted = plain_regression(d, term_columns(d), std::vector<double>{0, 1});
   EXPECT_LT((predicted - d.rows.measured_w()).cwiseAbs().maxCoeff(), 1) << predicted.transpose();
 }
 
