@@ -407,18 +407,18 @@ std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, robot:
 }
 
 void move_back(telemetry::Recording& mission, double delay_s, bool battery_alone) {
-  using namespace plausibility::reading;
+  namespace reading = plausibility::reading;
+  constexpr std::size_t first = reading::motor_voltage, last = reading::battery_current;
   constexpr double rounding = 1e-6;
   struct Row {
     double t_s;
-    std::array<double, battery_current + 1 - motor_voltage> readings;
+    std::array<double, last + 1 - first> readings;
   };
   std::vector<Row> rows;
   for (const signals::Sample& s : mission.samples) {
     Row& row = rows.emplace_back();
     row.t_s = 1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us);
-    for (std::size_t c = motor_voltage; c <= battery_current; ++c)
-      row.readings[c - motor_voltage] = *signals::numbers_of(s)[c];
+    for (std::size_t c = first; c <= last; ++c) row.readings[c - first] = *signals::numbers_of(s)[c];
   }
   std::size_t next = 1;
   for (std::size_t k = 0; k < rows.size(); ++k) {
@@ -428,9 +428,9 @@ void move_back(telemetry::Recording& mission, double delay_s, bool battery_alone
     const double part = (at_s - a.t_s) / (b.t_s - a.t_s);
     const bool inside = part >= -rounding && part <= 1 + rounding;
     const auto moved = signals::numbers_of(mission.samples[k]);
-    for (std::size_t c = battery_alone ? battery_voltage : motor_voltage; c <= battery_current; ++c)
-      *moved[c] = inside ? std::lerp(a.readings[c - motor_voltage], b.readings[c - motor_voltage], part)
-                         : signals::unmeasured;
+    for (std::size_t c = battery_alone ? reading::battery_voltage : first; c <= last; ++c)
+      *moved[c] =
+          inside ? std::lerp(a.readings[c - first], b.readings[c - first], part) : signals::unmeasured;
   }
 }
 

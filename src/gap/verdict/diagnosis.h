@@ -127,6 +127,9 @@ struct FileCorrection {
 // Origin of the gap's power; `motors`: their V i, without the base load.
 enum class PowerSource { battery, motors, none };
 inline constexpr std::array<std::string_view, 3> power_source_names{"battery", "motors", "none"};
+constexpr std::string_view name_of(PowerSource source) {
+  return power_source_names[static_cast<std::size_t>(source)];
+}
 
 enum class Verdict { none, effects, outside, inconclusive, not_this_robot };
 inline constexpr std::array<std::string_view, 5> verdict_names{"none", "effects", "outside", "inconclusive",
