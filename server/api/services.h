@@ -13,7 +13,7 @@
 #include "ingest/forecasts.h"
 #include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 #include "server/api/attention.h"
 #include "server/cluster/cluster.h"
 #include "server/diagnosis/diagnosis_service.h"

@@ -12,7 +12,7 @@
 #include "describe/schema.h"
 #include "forecast/leg_cost.h"
 #include "forecast/outlook.h"
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 
 namespace joulecast::answers {
 

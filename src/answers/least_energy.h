@@ -6,7 +6,7 @@
 
 #include "answers/model.h"
 #include "forecast/outlook.h"
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 
 namespace joulecast::answers {
 

@@ -14,7 +14,7 @@
 #include "answers/model.h"
 #include "describe/schema.h"
 #include "planning/cost_matrix.h"
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 
 namespace joulecast::answers {
 

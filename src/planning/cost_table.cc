@@ -43,6 +43,15 @@ std::pair<std::size_t, std::array<double, 4>> place(double at, std::size_t count
   return {first, cubic(at - static_cast<double>(first) - 1)};
 }
 
+// The parts of a robot that the table depends on: limits_of reads the battery's voltage.
+robot::RobotModel drive_of(const robot::RobotModel& robot) {
+  robot::RobotModel drive = robot;
+  drive.robot_id.clear();
+  drive.battery = {};
+  drive.battery.nominal_voltage_v = robot.battery.nominal_voltage_v;
+  return drive;
+}
+
 }  // namespace
 
 struct CostTable::Kind {
@@ -345,6 +354,37 @@ LegCost CostTable::solved(const Run& run, double payload_kg, const std::stop_tok
 
 LegCost CostTable::turn(double angle_rad, double payload_kg) const {
   return turn_.at(std::fabs(angle_rad), payload_kg);
+}
+
+std::shared_ptr<const CostTable> CostTableCache::find(const robot::RobotModel& robot,
+                                                      const CostOptions& options) {
+  const auto found = std::ranges::find_if(
+      entries_, [&](const Entry& each) { return each.options == options && each.robot == robot; });
+  if (found == entries_.end()) return nullptr;
+  entries_.splice(entries_.begin(), entries_, found);
+  return found->table;
+}
+
+Result<std::shared_ptr<const CostTable>> CostTableCache::get(const robot::RobotModel& robot,
+                                                             const CostOptions& options,
+                                                             std::stop_token stop) {
+  robot::RobotModel drive = drive_of(robot);
+  {
+    const std::lock_guard lock(mutex_);
+    if (auto table = find(drive, options)) return table;
+  }
+  TRY_ASSIGN(auto made, CostTable::make(drive, options, std::move(stop)));
+  auto table = std::make_shared<const CostTable>(std::move(made));
+  const std::lock_guard lock(mutex_);
+  if (auto meanwhile = find(drive, options)) return meanwhile;
+  entries_.push_front({std::move(drive), options, table});
+  if (entries_.size() > capacity_) entries_.pop_back();
+  return table;
+}
+
+std::size_t CostTableCache::size() const {
+  const std::lock_guard lock(mutex_);
+  return entries_.size();
 }
 
 }  // namespace joulecast::planning

@@ -8,7 +8,7 @@
 
 #include "answers/model.h"
 #include "missions.h"
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 
 namespace joulecast::forecast {
 

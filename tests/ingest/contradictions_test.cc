@@ -15,7 +15,7 @@
 #include "ingest/forecasts.h"
 #include "ingest/pipeline.h"
 #include "ingest/stored_robot.h"
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 #include "tests/ingest/sending_robot.h"
 #include "tests/support/import_csv.h"
 #include "tests/support/shared_folder.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "planning/cost_table_cache.h"
+#include "planning/cost_table.h"
 #include "planning/planner.h"
 #include "tests/planning/robots.h"
 
