@@ -82,7 +82,7 @@ class ReadingNoise {
     std::array<Eigen::Matrix3d, 2> of_means;
     std::array<double, 2> of_slope{};
   };
-  // The windows weigh with 1 + cos(2 pi t/L) (windows/kernel.h): the squares of n weights add up to 3/(2n)
+  // The windows weigh with 1 + cos(2 pi t/L) (windows/track.h): the squares of n weights add up to 3/(2n)
   // for a mean and 2 pi^2/(n L^2) for a slope.
   OfWindow in(const windows::Window& w) const {
     const auto at = [&](double t) { return std::ranges::lower_bound(time_s_, t) - time_s_.begin(); };

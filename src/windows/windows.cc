@@ -6,8 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include "statistics/robust.h"
 #include "statistics/updates.h"
-#include "windows/kernel.h"
 #include "windows/track.h"
 
 namespace joulecast::windows {
@@ -335,6 +335,27 @@ class MissionWindows {
   Track track_;
 };
 
+constexpr double read_often = 0.2;  // of the rows
+
+// Rows over all missions, and how many have a reading.
+struct Coverage {
+  std::size_t rows = 0, currents = 0, voltages = 0, battery = 0;
+
+  void add(const signals::Sample& s) {
+    ++rows;
+    currents += std::isfinite(s.motor_current_a[0] + s.motor_current_a[1]) ? 1 : 0;
+    voltages += std::isfinite(s.motor_voltage_v[0] + s.motor_voltage_v[1]) ? 1 : 0;
+    battery += std::isfinite(s.battery_voltage_v * s.battery_current_a) ? 1 : 0;
+  }
+  bool often(std::size_t count) const {
+    return static_cast<double>(count) > read_often * static_cast<double>(rows);
+  }
+};
+
+constexpr std::size_t enough_missions = 8;  // to leave out whole ones
+constexpr std::size_t most_blocks = 20;
+constexpr double shortest_block_s = 15;  // shorter blocks share slow errors with their neighbours
+
 }  // namespace
 
 std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions) {
@@ -385,6 +406,106 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
     }
   }
   return windows;
+}
+
+Readings find_readings(std::span<const telemetry::Recording> missions) {
+  std::vector<double> rows, battery_periods, motor_periods;
+  Coverage coverage;
+  for (const telemetry::Recording& mission : missions) {
+    rows.push_back(median_period_s(mission));
+    std::vector<double> time_s, battery_a, motor_a;
+    for (const signals::Sample& s : mission.samples) {
+      time_s.push_back(1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us));
+      battery_a.push_back(s.battery_current_a);
+      motor_a.push_back(s.motor_current_a[0]);
+      coverage.add(s);
+    }
+    const auto battery = statistics::find_updates(time_s, battery_a);
+    const auto motors = statistics::find_updates(time_s, motor_a);
+    if (battery.held) battery_periods.push_back(battery.period_s);
+    if (motors.held) motor_periods.push_back(motors.period_s);
+  }
+  Readings readings;
+  readings.row_s = statistics::median(std::move(rows));
+  const auto held = [&](std::vector<double> periods) {
+    if (2 * periods.size() <= missions.size()) return 0.0;
+    const double period = statistics::median(std::move(periods));
+    return period > 0.5 * WindowSettings{}.length_s ? period : 0.0;
+  };
+  const double battery_s = held(std::move(battery_periods)), motors_s = held(std::move(motor_periods));
+  readings.battery_held = battery_s > 0;
+  readings.motors_held = motors_s > 0;
+  readings.period_s = std::max({battery_s, motors_s, readings.row_s});
+  readings.motor_currents = coverage.often(coverage.currents);
+  readings.motor_voltages = coverage.often(coverage.voltages);
+  readings.battery_power = coverage.battery > 0;
+  return readings;
+}
+
+std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mission_length_s) {
+  double total_s = 0;
+  for (const double length : mission_length_s) total_s += length;
+  const double block_s = std::max(shortest_block_s, total_s / static_cast<double>(most_blocks));
+  // Each mission is divided into equal segments; missions shorter than a block are joined with the next.
+  std::vector<std::size_t> parts(mission_length_s.size(), 1), first(mission_length_s.size(), 0);
+  std::size_t blocks = 0;
+  double open_s = 0;  // of the block that short missions share
+  for (std::size_t m = 0; m < mission_length_s.size(); ++m) {
+    if (mission_length_s.size() < enough_missions)
+      parts[m] = std::max<std::size_t>(1, static_cast<std::size_t>(mission_length_s[m] / block_s));
+    const bool joins = m > 0 && parts[m] == 1 && parts[m - 1] == 1 && open_s > 0 &&
+                       open_s + 0.5 * mission_length_s[m] < block_s;
+    if (!joins) {
+      first[m] = blocks;
+      blocks += parts[m];
+      open_s = 0;
+    } else {
+      first[m] = blocks - 1;
+    }
+    open_s += mission_length_s[m];
+  }
+  for (Window& w : windows) {
+    const auto n = parts[w.mission];
+    const double place = w.t_s / std::max(mission_length_s[w.mission], 1e-9) * static_cast<double>(n);
+    w.block = first[w.mission] + std::min(n - 1, static_cast<std::size_t>(std::max(0.0, place)));
+  }
+  return blocks;
+}
+
+bool steady(const Window& w) {
+  return (w.moving[0] || w.resting[0]) && (w.moving[1] || w.resting[1]);
+}
+
+dynamics::Instant instant_of(const Window& w) {
+  dynamics::Instant at;
+  at.wheel_speed_rad_s = w.speed_rad_s;
+  at.wheel_acceleration_rad_s2 = w.acceleration_rad_s2;
+  at.payload_kg = w.payload_kg;
+  at.x_m = w.x_m;
+  at.y_m = w.y_m;
+  at.heading_rad = w.heading_rad;
+  at.climb_rad = w.climb_rad;
+  return at;
+}
+
+std::array<double, 5> plain_terms(const Window& w, double wheel_radius_m) {
+  std::array<double, 5> terms{1, 0, 0, 0, 0};
+  const double climb = std::isfinite(w.climb_rad) ? std::sin(w.climb_rad) : 0;
+  const auto add = [&](double weight, const std::array<double, 2>& wheels,
+                       const std::array<double, 2>& rates) {
+    const double speed = 0.5 * wheel_radius_m * (wheels[0] + wheels[1]);
+    terms[1] += weight * std::fabs(speed);
+    terms[2] += weight * std::fabs(wheel_radius_m * (wheels[0] - wheels[1]));
+    terms[3] += weight * speed * 0.5 * wheel_radius_m * (rates[0] + rates[1]);
+    terms[4] += weight * speed * climb;
+  };
+  if (!w.reading) {
+    add(1, w.speed_rad_s, w.acceleration_rad_s2);
+    return terms;
+  }
+  for (std::size_t part = 0; part < w.part_weight.size(); ++part)
+    add(w.part_weight[part], w.part_speed_rad_s[part], w.part_acceleration_rad_s2[part]);
+  return terms;
 }
 
 }  // namespace joulecast::windows

@@ -1,5 +1,3 @@
-#include "windows/kernel.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,8 @@
 #include <numbers>
 #include <random>
 #include <vector>
+
+#include "windows/track.h"
 
 namespace joulecast::windows {
 namespace {
