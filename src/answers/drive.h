@@ -12,7 +12,6 @@
 #include "planning/cost_matrix.h"
 #include "planning/path.h"
 #include "planning/problem.h"
-#include "planning/profile.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::answers {

@@ -9,7 +9,7 @@
 #include "answers/profile.h"
 #include "base/try.h"
 #include "forecast/outlook.h"
-#include "planning/gauss.h"
+#include "planning/numerics.h"
 
 namespace joulecast::answers {
 namespace {

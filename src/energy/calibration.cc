@@ -15,7 +15,7 @@
 #include "energy/drive_equations.h"
 #include "energy/power_windows.h"
 #include "statistics/distributions.h"
-#include "telemetry/payload.h"
+#include "telemetry/recording.h"
 #include "windows/windows.h"
 
 namespace joulecast::energy {

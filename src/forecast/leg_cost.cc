@@ -6,8 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "planning/gauss.h"
-#include "planning/root.h"
+#include "planning/numerics.h"
 
 namespace joulecast::forecast {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "planning/root.h"
+#include "planning/numerics.h"
 
 namespace joulecast::forecast {
 namespace {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "planning/root.h"
+#include "planning/numerics.h"
 #include "statistics/distributions.h"
 
 namespace joulecast::forecast {

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "dynamics/drive_model.h"
-#include "ingest/contradiction.h"
 #include "ingest/counters.h"
 #include "plausibility/observation.h"
 #include "robot/robot_model.h"

@@ -15,7 +15,7 @@
 
 #include "ingest/by_robot.h"
 #include "ingest/charge_watch.h"
-#include "ingest/contradiction.h"
+#include "ingest/counters.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
 

@@ -11,7 +11,7 @@
 #include "ingest/counters.h"
 #include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
-#include "telemetry/payload.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::ingest {
 

@@ -10,7 +10,7 @@
 #include "drift/marks.h"
 #include "energy/refinement.h"
 #include "history/records.h"
-#include "ingest/contradiction.h"
+#include "ingest/counters.h"
 #include "robot/robot_model.h"
 #include "signals/sample.h"
 

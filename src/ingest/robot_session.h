@@ -1,5 +1,8 @@
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <deque>
@@ -19,8 +22,6 @@
 #include "ingest/contradiction_watch.h"
 #include "ingest/counters.h"
 #include "ingest/covariate_watch.h"
-#include "ingest/event_allowance.h"
-#include "ingest/fault_log.h"
 #include "ingest/fleet_view.h"
 #include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
@@ -35,6 +36,60 @@
 #include "telemetry/sequence_tracker.h"
 
 namespace joulecast::ingest {
+
+// Rate limit of a robot's mission events: a token bucket that is refilled by time and by samples, because
+// recordings are replayed faster than they were made.
+class EventAllowance {
+ public:
+  explicit EventAllowance(double rate_hz) : rate_hz_(rate_hz) {}
+
+  void earn_by_sample() { earn(a_sample); }
+
+  // Takes one event; returns false if the allowance is used up.
+  bool spend(std::int64_t host_utime_us) {
+    earn(1e-6 * static_cast<double>(std::max<std::int64_t>(0, host_utime_us - earned_utime_us_)) * rate_hz_);
+    earned_utime_us_ = host_utime_us;
+    if (left_ < 1) return false;
+    --left_;
+    return true;
+  }
+
+  void give_back() { ++left_; }
+
+ private:
+  static constexpr double at_once = 100, a_sample = 0.2;
+
+  void earn(double events) { left_ = std::min(at_once, left_ + events); }
+
+  double rate_hz_;
+  double left_ = at_once;
+  std::int64_t earned_utime_us_ = 0;  // host's, when it was last earned with time
+};
+
+// Log lines of a robot's faults: the first of a kind, then one in ten minutes at most with the number since.
+class FaultLog {
+ public:
+  // The line to log, if it is time for one.
+  std::optional<std::string> add(IngestFault fault, std::uint64_t count, const std::string& why,
+                                 std::int64_t host_utime_us) {
+    const auto [logged, first] = logged_.try_emplace(fault);
+    logged->second.since += count;
+    if (!first && host_utime_us - logged->second.utime_us < period_us) return {};
+    std::string line = fmt::format("{}: {} ({}{})", name_of(fault), why, logged->second.since,
+                                   first ? " so far" : " since this was last logged");
+    logged->second = {host_utime_us, 0};
+    return line;
+  }
+
+ private:
+  static constexpr std::int64_t period_us = 600'000'000;
+
+  struct Logged {
+    std::int64_t utime_us = 0;  // host's, when it was last logged
+    std::uint64_t since = 0;    // further ones
+  };
+  std::map<IngestFault, Logged> logged_;
+};
 
 struct SessionSettings {
   energy::MeterSettings meter;

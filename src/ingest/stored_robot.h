@@ -16,7 +16,7 @@
 #include "base/error.h"
 #include "history/commands.h"
 #include "history/store.h"
-#include "ingest/contradiction.h"
+#include "ingest/counters.h"
 #include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
 #include "signals/gaps.h"

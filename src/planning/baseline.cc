@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "planning/gauss.h"
+#include "planning/numerics.h"
 
 namespace joulecast::planning {
 namespace {

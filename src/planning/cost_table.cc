@@ -9,8 +9,8 @@
 
 #include "base/try.h"
 #include "dynamics/drive_model.h"
+#include "planning/numerics.h"
 #include "planning/planner.h"
-#include "planning/root.h"
 #include "planning/run_planner.h"
 
 namespace joulecast::planning {

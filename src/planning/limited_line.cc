@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "planning/root.h"
+#include "planning/numerics.h"
 
 namespace joulecast::planning {
 namespace {

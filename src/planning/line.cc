@@ -7,7 +7,7 @@
 #include <string>
 
 #include "base/try.h"
-#include "planning/root.h"
+#include "planning/numerics.h"
 
 namespace joulecast::planning {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/try.h"
-#include "planning/gauss.h"
+#include "planning/numerics.h"
 
 namespace joulecast::planning {
 namespace {

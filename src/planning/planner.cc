@@ -13,8 +13,7 @@
 #include <utility>
 
 #include "base/try.h"
-#include "planning/gauss.h"
-#include "planning/root.h"
+#include "planning/numerics.h"
 #include "planning/run_planner.h"
 
 namespace joulecast::planning {

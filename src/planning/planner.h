@@ -8,7 +8,6 @@
 #include "planning/load.h"
 #include "planning/path.h"
 #include "planning/problem.h"
-#include "planning/profile.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::planning {

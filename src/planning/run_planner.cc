@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "base/try.h"
-#include "planning/gauss.h"
+#include "planning/numerics.h"
 #include "planning/peaks.h"
-#include "planning/root.h"
 
 namespace joulecast::planning {
 namespace {

@@ -11,7 +11,6 @@
 #include "planning/load.h"
 #include "planning/path.h"
 #include "planning/problem.h"
-#include "planning/profile.h"
 #include "planning/speed_solver.h"
 #include "planning/uniform_motion.h"
 

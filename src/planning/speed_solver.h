@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "planning/load.h"
-#include "planning/profile.h"
+#include "planning/problem.h"
 #include "planning/speed_grid.h"
 
 namespace joulecast::planning {

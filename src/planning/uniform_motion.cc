@@ -7,8 +7,7 @@
 #include <string>
 
 #include "dynamics/stribeck_curve.h"
-#include "planning/gauss.h"
-#include "planning/root.h"
+#include "planning/numerics.h"
 
 namespace joulecast::planning {
 namespace {

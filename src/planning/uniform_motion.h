@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "planning/load.h"
-#include "planning/profile.h"
+#include "planning/problem.h"
 
 namespace joulecast::planning {
 

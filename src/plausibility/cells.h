@@ -8,7 +8,7 @@
 #include "plausibility/readings.h"
 #include "plausibility/tally.h"
 #include "signals/sample.h"
-#include "telemetry/payload.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::plausibility {
 

@@ -1,6 +1,6 @@
-#include "ingest/event_allowance.h"
-
 #include <gtest/gtest.h>
+
+#include "ingest/robot_session.h"
 
 namespace joulecast::ingest {
 namespace {

@@ -1,6 +1,6 @@
-#include "ingest/fault_log.h"
-
 #include <gtest/gtest.h>
+
+#include "ingest/robot_session.h"
 
 namespace joulecast::ingest {
 namespace {

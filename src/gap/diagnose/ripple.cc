@@ -11,7 +11,7 @@
 
 #include "base/median.h"
 #include "dynamics/drive_model.h"
-#include "telemetry/payload.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::gap {
 namespace {
