@@ -131,7 +131,7 @@ Response ledger_csv(const Request& request, const history::Mission& mission) {
 
 Response covariates_csv(const Request& request, const history::CovariatePage& page, history::MissionKey key) {
   Csv csv(request, {"name", "utime_us", "value"});
-  for (const signals::CovariateSeries& series : signals::series_of(page.changes))
+  for (const signals::CovariateSeries& series : signals::series_of(page.items))
     for (std::size_t k = 0; k < series.value.size(); ++k)
       csv.field(series.name).field(series.utime_us[k]).exact(series.value[k]).end_row();
   return csv.response("mission-" + std::to_string(key) + "-covariates", page.next_cursor);
@@ -177,7 +177,7 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
                                                   ? std::string(".").append(field.part)
                                                   : ""));
   Csv csv(request, names);
-  for (const signals::Sample& sample : page.samples) {
+  for (const signals::Sample& sample : page.items) {
     csv.field(sample.utime_us).field(sample.sequence);
     for (const double* number : signals::numbers_of(sample)) csv.exact(*number);
     csv.end_row();
@@ -263,7 +263,7 @@ struct TelemetryAnswer {
 };
 
 std::vector<double> numbers_of(const TelemetryAnswer& a, std::size_t k) {
-  return column_of(a.page.samples, [k](const auto& sample) { return *signals::numbers_of(sample)[k]; });
+  return column_of(a.page.items, [k](const auto& sample) { return *signals::numbers_of(sample)[k]; });
 }
 
 std::string_view words_of(std::string_view key) {
@@ -291,7 +291,7 @@ Table<TelemetryAnswer> make_telemetry() {
   using A = TelemetryAnswer;
   Table<A> table("Samples of a mission as received, in columns; null = not measured");
   const auto integers = [](auto signals::Sample::*member) {
-    return [member](const A& a) { return a.page.samples | std::views::transform(member); };
+    return [member](const A& a) { return a.page.items | std::views::transform(member); };
   };
   table.value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
       .integers("utime_us", integers(&signals::Sample::utime_us),
@@ -340,13 +340,12 @@ const Table<CovariatesAnswer>& covariates_table() {
           .value("name", &C::name, "with its unit; a label as name=label")
           .integers("utime_us", &C::utime_us, "start of each value, which is valid until the next one")
           .exact("value", &C::value, "of a label 1 (set) or 0 (not set); null: unknown from then on");
-  static const auto table =
-      Table<A>("Changes of a mission's covariates, one series per name")
-          .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
-          .list(
-              "covariates", [](const A& a) { return signals::series_of(a.page.changes); },
-              "in the order of their first change in the page", series)
-          .text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
+  static const auto table = Table<A>("Changes of a mission's covariates, one series per name")
+                                .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+                                .list(
+                                    "covariates", [](const A& a) { return signals::series_of(a.page.items); },
+                                    "in the order of their first change in the page", series)
+                                .text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
   return table;
 }
 

@@ -10,17 +10,16 @@ namespace joulecast::server {
 namespace {
 
 // All pages of a query of a mission's recording.
-template <class Page, class Item>
+template <class Item>
 Result<std::vector<Item>> all_of(const history::Store& store, history::MissionKey key,
-                                 Result<Page> (history::Store::*query)(history::MissionKey,
-                                                                       history::TimeRange,
-                                                                       const history::PageRequest&) const,
-                                 std::vector<Item> Page::*items) {
+                                 Result<history::ItemPage<Item>> (history::Store::*query)(
+                                     history::MissionKey, history::TimeRange, const history::PageRequest&)
+                                     const) {
   history::PageRequest page{history::max_telemetry_samples, {}};
   std::vector<Item> all;
   do {
-    TRY_ASSIGN(Page got, (store.*query)(key, {}, page));
-    std::ranges::move(got.*items, std::back_inserter(all));
+    TRY_ASSIGN(auto got, (store.*query)(key, {}, page));
+    std::ranges::move(got.items, std::back_inserter(all));
     page.cursor = std::move(got.next_cursor);
   } while (!page.cursor.empty());
   return all;
@@ -42,8 +41,7 @@ class Reader {
     if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
                       wanted_.max_samples)
       return ++out.too_many, Result<void>{};
-    TRY_ASSIGN(auto samples,
-               all_of(store_, mission.key, &history::Store::telemetry, &history::TelemetryPage::samples));
+    TRY_ASSIGN(auto samples, all_of(store_, mission.key, &history::Store::telemetry));
     telemetry::put_in_order(samples);
     // The accounts of a mission do not apply once the retention has dropped a part of it.
     if (static_cast<std::int64_t>(samples.size()) * 10 < mission.samples * 9 || samples.size() < 2)
@@ -52,8 +50,7 @@ class Reader {
         charging != mission.sample_faults.end() && charging->second > 0)
       out.charging_samples += ingest::drop_charging(wanted_.battery_capacity_ah, samples);
     if (samples.size() < 2) return ++out.no_telemetry, Result<void>{};
-    TRY_ASSIGN(const auto changes,
-               all_of(store_, mission.key, &history::Store::covariates, &history::CovariatePage::changes));
+    TRY_ASSIGN(const auto changes, all_of(store_, mission.key, &history::Store::covariates));
     result_.samples += samples.size();
     result_.missions.push_back({mission.key,
                                 mission.start_utime_us,

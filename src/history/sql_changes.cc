@@ -217,8 +217,9 @@ Outcome SqlChanges::keep_samples(const Command& command) {
   for (const MissionKey each : keys) {
     PageRequest page{max_telemetry_samples, {}};
     do {
-      TRY_ASSIGN(auto got, chunks::telemetry(database_, each, {first.utime_us, last.utime_us + 1}, page));
-      for (const signals::Sample& sample : got.samples) stored.emplace(sample.utime_us, sample.sequence);
+      TRY_ASSIGN(auto got, chunks::read_page<signals::Sample>(database_, each,
+                                                              {first.utime_us, last.utime_us + 1}, page));
+      for (const signals::Sample& sample : got.items) stored.emplace(sample.utime_us, sample.sequence);
       page.cursor = std::move(got.next_cursor);
     } while (!page.cursor.empty());
   }

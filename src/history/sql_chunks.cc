@@ -104,8 +104,26 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
 }
 
 template <class Item>
-std::int64_t append_items(Database& database, const End& end, std::span<const Item> items, bool ended,
-                          std::int64_t now_utime_us) {
+std::string in_tail_sql() {
+  return sql_of<Item>(
+      "(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table AS tail WHERE tail.mission_key = "
+      "mission.mission_key AND tail.sealed = 0)");
+}
+
+}  // namespace
+
+const std::string& in_tails_sql() {
+  static const std::string sql = in_tail_sql<Sample>() + ", " + in_tail_sql<CovariateChange>();
+  return sql;
+}
+
+std::string telemetry_columns() {
+  return chunk_columns(Table<Sample>::items);
+}
+
+template <class Item>
+std::int64_t append(Database& database, const End& end, const std::vector<Item>& items, bool ended,
+                    std::int64_t now_utime_us) {
   if (items.empty() && (!ended || end.in_tail == 0)) return end.in_tail;
   const std::size_t unsealed = static_cast<std::size_t>(end.in_tail) + items.size();
   if (!ended && unsealed < sealed_items) {
@@ -126,22 +144,15 @@ std::int64_t append_items(Database& database, const End& end, std::span<const It
 }
 
 template <class Item>
-std::string in_tail_sql() {
-  return sql_of<Item>(
-      "(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table AS tail WHERE tail.mission_key = "
-      "mission.mission_key AND tail.sealed = 0)");
-}
-
-// A page of items of the range in order of arrival, into `out`; answers the cursor of the next page.
-template <class Item>
-Result<std::string> read_page(Database& database, MissionKey key, TimeRange range, const PageRequest& page,
-                              std::vector<Item>& out) {
+Result<ItemPage<Item>> read_page(Database& database, MissionKey key, TimeRange range,
+                                 const PageRequest& page) {
+  ItemPage<Item> found;
   const std::string query = std::string(Table<Item>::name) + '|' + std::to_string(key) + '|' +
                             std::to_string(range.from_utime_us) + '|' + std::to_string(range.to_utime_us);
   std::int64_t from_ordinal = 0;
   if (!page.cursor.empty()) {
     TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
-    from_ordinal = (place)[0];
+    from_ordinal = place[0];
   }
   static const std::string select = sql_of<Item>(
       "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= coalesce((SELECT "
@@ -157,59 +168,28 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
         const std::int64_t at = ordinal++;
         if (at < from_ordinal || item.utime_us < range.from_utime_us || item.utime_us >= range.to_utime_us)
           continue;
-        if (static_cast<std::int64_t>(out.size()) == page.limit) return encode_cursor(query, {at, 0});
-        out.push_back(item);
+        if (static_cast<std::int64_t>(found.items.size()) == page.limit) {
+          found.next_cursor = encode_cursor(query, {at, 0});
+          return found;
+        }
+        found.items.push_back(item);
       }
     }
-    if (chunks < chunks_at_once) return std::string();
+    if (chunks < chunks_at_once) return found;
     from_ordinal = ordinal;
   }
 }
 
-template <class Page, class Item>
-Result<Page> page_of(Database& database, MissionKey key, TimeRange range, const PageRequest& page,
-                     std::vector<Item> Page::*items) {
-  Page result;
-  TRY_ASSIGN(result.next_cursor, read_page(database, key, range, page, result.*items));
-  return result;
-}
-
-}  // namespace
-
-const std::string& in_tails_sql() {
-  static const std::string sql = in_tail_sql<Sample>() + ", " + in_tail_sql<CovariateChange>();
-  return sql;
-}
-
-std::string telemetry_columns() {
-  return chunk_columns(Table<Sample>::items);
-}
-
-std::int64_t append(Database& database, const End& end, std::span<const Sample> samples, bool ended,
-                    std::int64_t now_utime_us) {
-  return append_items(database, end, samples, ended, now_utime_us);
-}
-
-std::int64_t append(Database& database, const End& end, std::span<const CovariateChange> changes, bool ended,
-                    std::int64_t now_utime_us) {
-  return append_items(database, end, changes, ended, now_utime_us);
-}
+template std::int64_t append(Database&, const End&, const std::vector<Sample>&, bool, std::int64_t);
+template std::int64_t append(Database&, const End&, const std::vector<CovariateChange>&, bool, std::int64_t);
+template Result<TelemetryPage> read_page(Database&, MissionKey, TimeRange, const PageRequest&);
+template Result<CovariatePage> read_page(Database&, MissionKey, TimeRange, const PageRequest&);
 
 void drop_recordings(Database& database, MissionKey key) {
   for (const char* sql :
        {"DELETE FROM trace WHERE mission_key = ?", "DELETE FROM telemetry_chunk WHERE mission_key = ?",
         "DELETE FROM covariate_chunk WHERE mission_key = ?"})
     Rows(database, sql, key).run_later();
-}
-
-Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
-                                const PageRequest& page) {
-  return page_of<TelemetryPage>(database, key, range, page, &TelemetryPage::samples);
-}
-
-Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
-                                 const PageRequest& page) {
-  return page_of<CovariatePage>(database, key, range, page, &CovariatePage::changes);
 }
 
 std::int64_t encoded_bytes(Database& database) {

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "history/commands.h"
@@ -32,17 +32,16 @@ const std::string& in_tails_sql();
 
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
 // ended. The mission's row counts them already. Answers how many are in the tail then.
-std::int64_t append(Database& database, const End& end, std::span<const signals::Sample> samples, bool ended,
+template <class Item>
+std::int64_t append(Database& database, const End& end, const std::vector<Item>& items, bool ended,
                     std::int64_t now_utime_us);
-std::int64_t append(Database& database, const End& end, std::span<const signals::CovariateChange> changes,
-                    bool ended, std::int64_t now_utime_us);
 
 // Deletes the trace and the chunks of a mission that was deleted.
 void drop_recordings(Database& database, MissionKey key);
 
-// As Store's; the mission must exist.
-Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
-Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
+// As Store::telemetry() and Store::covariates(); the mission must exist.
+template <class Item>
+Result<ItemPage<Item>> read_page(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page);
 
 std::int64_t encoded_bytes(Database& database);

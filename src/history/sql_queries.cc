@@ -133,14 +133,14 @@ Result<Trace> Store::trace(MissionKey key, TimeRange range, std::int64_t max_poi
 Result<TelemetryPage> Store::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
   return read([&](Database& database) -> Result<TelemetryPage> {
     TRY(check_page(database, key, range, page));
-    return chunks::telemetry(database, key, range, page);
+    return chunks::read_page<signals::Sample>(database, key, range, page);
   });
 }
 
 Result<CovariatePage> Store::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
   return read([&](Database& database) -> Result<CovariatePage> {
     TRY(check_page(database, key, range, page));
-    return chunks::covariates(database, key, range, page);
+    return chunks::read_page<signals::CovariateChange>(database, key, range, page);
   });
 }
 

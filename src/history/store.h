@@ -117,16 +117,13 @@ inline constexpr std::int64_t max_trace_points = 20'000;
 inline constexpr std::int64_t max_telemetry_samples = 100'000;
 
 // In the order of arrival, which is not always that of utime.
-struct TelemetryPage {
-  std::vector<signals::Sample> samples;
+template <class Item>
+struct ItemPage {
+  std::vector<Item> items;
   std::string next_cursor;  // empty: nothing follows
 };
-
-// In the order of arrival, which is not always that of utime.
-struct CovariatePage {
-  std::vector<signals::CovariateChange> changes;
-  std::string next_cursor;  // empty: nothing follows
-};
+using TelemetryPage = ItemPage<signals::Sample>;
+using CovariatePage = ItemPage<signals::CovariateChange>;
 
 inline constexpr std::int64_t max_floor_points = 1'000'000;  // seconds of missions
 inline constexpr double least_floor_cell_m = 0.1;

@@ -57,25 +57,6 @@ std::int64_t rows_of(Database& database, const Table& table) {
   return database.integer("SELECT count(*) FROM " + table.name);
 }
 
-// Visits the rows that the statement gives, puts the last one's key into `last` and returns their number.
-template <class Visit>
-std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& last, Visit visit) {
-  std::int64_t count = 0;
-  Key key;
-  for (; rows.next(); ++count) {
-    visit(select);
-    key.clear();
-    for (int k = 0; k < static_cast<int>(table.key.size()); ++k) {
-      if (select.type(k) == Statement::Type::integer)
-        key.emplace_back(select.integer(k));
-      else
-        key.emplace_back(std::string(select.bytes(k)));
-    }
-  }
-  if (count > 0) last = key;
-  return count;
-}
-
 // Visits the next rows by key, at most `limit`, and moves the key on; returns their number, 0 at the end.
 template <class Visit>
 std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
@@ -87,7 +68,17 @@ std::int64_t scan(Database& database, const Table& table, const std::vector<std:
   Rows rows(select);
   for (const auto& part : after) std::visit([&](const auto& value) { rows.bind(value); }, part);
   rows.bind(limit);
-  return visit_rows(rows, select, table, after, visit);
+  std::int64_t count = 0;
+  Key last;
+  for (; rows.next(); ++count) {
+    visit(select);
+    last.clear();
+    for (int k = 0; k < static_cast<int>(table.key.size()); ++k)
+      select.type(k) == Statement::Type::integer ? last.emplace_back(select.integer(k))
+                                                 : last.emplace_back(std::string(select.bytes(k)));
+  }
+  if (count > 0) after = last;
+  return count;
 }
 
 // Adds rows up to a TableSummary.

@@ -55,7 +55,7 @@ Result<std::vector<signals::Sample>> tail_of(const history::Store& store, const 
   for (std::int64_t reach_us = tail_us;; reach_us *= 8) {
     TRY_ASSIGN(auto page, store.telemetry(open.key, {open.end_utime_us - reach_us, history::whole_future},
                                           {.limit = history::max_telemetry_samples, .cursor = {}}));
-    tail = std::move(page.samples);
+    tail = std::move(page.items);
     if (tail.size() >= tail_samples || open.end_utime_us - reach_us <= open.start_utime_us) break;
   }
   // Where the robot's clock was set back, those before have times that come again.

@@ -109,13 +109,13 @@ std::int64_t stored_samples(const std::string& path) {
   PageRequest page{max_telemetry_samples, {}};
   do {
     const TelemetryPage got = need(store->telemetry(m.key, {}, page));
-    for (const auto& sample : got.samples) EXPECT_EQ(sample.sequence, next++);
+    for (const auto& sample : got.items) EXPECT_EQ(sample.sequence, next++);
     page.cursor = got.next_cursor;
   } while (!page.cursor.empty());
   EXPECT_EQ(next, m.samples);
   const CovariatePage covariates = need(store->covariates(m.key, {}, {max_telemetry_samples, {}}));
-  EXPECT_EQ(static_cast<std::int64_t>(covariates.changes.size()), m.samples / samples_a_checkpoint);
-  EXPECT_EQ(covariates.changes.back().value, m.accounts.distance_m);
+  EXPECT_EQ(static_cast<std::int64_t>(covariates.items.size()), m.samples / samples_a_checkpoint);
+  EXPECT_EQ(covariates.items.back().value, m.accounts.distance_m);
   return m.samples;
 }
 

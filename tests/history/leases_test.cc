@@ -125,8 +125,8 @@ TEST_F(LeasesTest, CommitUnderLostLeaseIsDropped) {
   ASSERT_TRUE(checkpoint(*b->store, same, taken[0].epoch, 3));
   EXPECT_TRUE(b->dropped.empty());
   const auto stored = need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}}));
-  ASSERT_EQ(stored.samples.size(), 2u);
-  EXPECT_EQ(stored.samples[1].sequence, 3);
+  ASSERT_EQ(stored.items.size(), 2u);
+  EXPECT_EQ(stored.items[1].sequence, 3);
   EXPECT_EQ(a->leases->renew().error().fault, Fault::conflict);
 }
 
@@ -163,7 +163,7 @@ TEST_F(LeasesTest, FencedSpoolKeepsMissingSamples) {
   EXPECT_EQ(a->dropped["nomad"], 1U);
   ASSERT_TRUE(checkpoint(*b->store, mission, of_b, 6));
   std::vector<std::int64_t> sequences;
-  for (const auto& sample : need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}})).samples)
+  for (const auto& sample : need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}})).items)
     sequences.push_back(sample.sequence);
   EXPECT_THAT(sequences, ::testing::ElementsAre(1, 3, 5, 2, 4, 6));
   EXPECT_EQ(need(b->store->mission(mission.key)).samples, 4) << "the accounts stay those of the keepers";
@@ -224,7 +224,7 @@ TEST_F(LeasesTest, ReleaseFollowsEarlierCommands) {
   const auto taken = take(*b->leases, "nomad");
   ASSERT_EQ(taken.size(), 1u);
   EXPECT_EQ(taken[0].position, (StreamPosition{1'000'049, 49}));
-  EXPECT_EQ(need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 50u);
+  EXPECT_EQ(need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}})).items.size(), 50u);
 }
 
 TEST_F(LeasesTest, MissionKeysAreUnique) {

@@ -95,7 +95,7 @@ TEST_F(PostgresStoreTest, ReconnectsAfterLostConnections) {
     // Every reading connection was ended too.
     EXPECT_EQ(need(store->mission(m.key)).samples, m.samples);
   }
-  EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).samples.size(), 50U);
+  EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).items.size(), 50U);
 }
 
 // Of accounting, which begins missions, and of a commit.
@@ -139,7 +139,7 @@ TEST_F(PostgresStoreTest, ServerRestartLosesNothing) {
   EXPECT_TRUE(writer.flush());
   EXPECT_TRUE(writer.status().healthy);
   std::this_thread::sleep_for(milliseconds(1100));  // a reading connection is not tried more often
-  EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).samples.size(), 200U);
+  EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).items.size(), 200U);
   EXPECT_EQ(need(store->mission(later.key)).mission_id, "later");
   EXPECT_EQ(stored_events(), 0);  // the outcome reported to its sender: not done
 }

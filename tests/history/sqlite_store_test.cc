@@ -174,10 +174,10 @@ TEST_F(SqliteStoreTest, FullDiskFailsTheWholeBatch) {
     const auto outcomes = store->apply(batch);
     ASSERT_FALSE(outcomes);
     EXPECT_EQ(outcomes.error().fault, Fault::unavailable) << describe(outcomes.error());
-    EXPECT_TRUE(need(store->telemetry(m.key, {}, {})).samples.empty());
+    EXPECT_TRUE(need(store->telemetry(m.key, {}, {})).items.empty());
   }
   for (const Outcome& outcome : need(store->apply(batch))) EXPECT_TRUE(outcome);
-  EXPECT_EQ(need(store->telemetry(m.key, {}, {max_telemetry_samples, {}})).samples.size(), 50U * 1024);
+  EXPECT_EQ(need(store->telemetry(m.key, {}, {max_telemetry_samples, {}})).items.size(), 50U * 1024);
   EXPECT_EQ(SqliteDatabase(path_, OpenMode::read_only, 50).text("PRAGMA integrity_check"), "ok");
 }
 
@@ -200,8 +200,8 @@ TEST_F(SqliteStoreTest, DamagedTailAcceptsNewSamples) {
   need(apply_one(*store, CheckpointMission{m, {}, {}, {}}));
   EXPECT_EQ(store->telemetry(key, {}, {100, {}}).error().fault, Fault::corrupt);
   const TelemetryPage later = need(store->telemetry(key, {1'000'000, whole_future}, {100'000, {}}));
-  ASSERT_EQ(later.samples.size(), 3000U);
-  EXPECT_EQ(later.samples.front().sequence, 10);
+  ASSERT_EQ(later.items.size(), 3000U);
+  EXPECT_EQ(later.items.front().sequence, 10);
 }
 
 TEST_F(SqliteStoreTest, MergesSmallChunks) {

@@ -76,7 +76,7 @@ class StoreConformance : public ::testing::TestWithParam<StoreKind> {
     PageRequest page{limit, {}};
     do {
       const TelemetryPage got = need(store_->telemetry(key, range, page));
-      samples.insert(samples.end(), got.samples.begin(), got.samples.end());
+      samples.insert(samples.end(), got.items.begin(), got.items.end());
       page.cursor = got.next_cursor;
     } while (!page.cursor.empty());
     return samples;
@@ -88,7 +88,7 @@ class StoreConformance : public ::testing::TestWithParam<StoreKind> {
     PageRequest page{limit, {}};
     do {
       const CovariatePage got = need(store_->covariates(key, range, page));
-      changes.insert(changes.end(), got.changes.begin(), got.changes.end());
+      changes.insert(changes.end(), got.items.begin(), got.items.end());
       page.cursor = got.next_cursor;
     } while (!page.cursor.empty());
     return changes;
@@ -1371,8 +1371,7 @@ TEST_P(StoreConformance, ReadersSeeWholeTransactions) {
         }
         ++reads;
         // A checkpoint adds ten samples and their count in one transaction; the page is read after the count.
-        if (page->samples.size() % 10 != 0 ||
-            static_cast<std::int64_t>(page->samples.size()) < mission->samples)
+        if (page->items.size() % 10 != 0 || static_cast<std::int64_t>(page->items.size()) < mission->samples)
           ++torn;
       } while (!done);
     });

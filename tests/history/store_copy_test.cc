@@ -108,7 +108,7 @@ TEST_F(StoreCopyTest, RoundTripThroughPostgresIsExact) {
     EXPECT_GT(need(apply_one(*store, AppendEvent{{0, 9, "", "kind", "{}"}})), 5);
     Mission m = need(store->recover()).front();
     need(apply_one(*store, CheckpointMission{m, {}, some_samples(0, 3000, 3000), {}}));
-    EXPECT_EQ(need(store->telemetry(m.key, {}, {10'000, {}})).samples.size(), 6000U);
+    EXPECT_EQ(need(store->telemetry(m.key, {}, {10'000, {}})).items.size(), 6000U);
     EXPECT_GT(start_mission(*store, "amr-1", "new", 5).key, m.key);
     // The chain of the audit is whole and goes on.
     const std::string head = need(verify_audit(source_)).head;

@@ -248,9 +248,9 @@ TEST_F(WriterTest, OffersMergeDuringAStall) {
   EXPECT_EQ(need(store_.mission(m.key)).samples, 10'000);
   EXPECT_EQ(need(store_.learned("amr-1", "charge"))->utime_us, 399);
   const auto page = need(store_.telemetry(m.key, {}, {.limit = 20'000, .cursor = {}}));
-  ASSERT_EQ(page.samples.size(), 10'000U);
-  for (std::size_t k = 0; k < page.samples.size(); ++k)
-    ASSERT_EQ(page.samples[k].sequence, static_cast<std::int64_t>(k));
+  ASSERT_EQ(page.items.size(), 10'000U);
+  for (std::size_t k = 0; k < page.items.size(); ++k)
+    ASSERT_EQ(page.items[k].sequence, static_cast<std::int64_t>(k));
 }
 
 TEST_F(WriterTest, RestartSeparatesMergedCheckpoints) {
@@ -265,7 +265,7 @@ TEST_F(WriterTest, RestartSeparatesMergedCheckpoints) {
   ASSERT_TRUE(writer.offer(CheckpointMission{m, {}, some_samples(0, 0, 10), {}}));
   store_.fails = false;
   ASSERT_TRUE(writer.flush());
-  EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 10U);
+  EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).items.size(), 10U);
 }
 
 TEST_F(WriterTest, FullQueueShedsSamplesOnly) {
@@ -283,8 +283,8 @@ TEST_F(WriterTest, FullQueueShedsSamplesOnly) {
   ASSERT_TRUE(writer.flush());
   EXPECT_EQ(need(store_.mission(m.key)).samples, 10'000);
   const auto page = need(store_.telemetry(m.key, {}, {.limit = 20'000, .cursor = {}}));
-  EXPECT_GT(page.samples.size(), 100U);
-  EXPECT_EQ(page.samples.size() + writer.status().shed_samples, 10'000U);
+  EXPECT_GT(page.items.size(), 100U);
+  EXPECT_EQ(page.items.size() + writer.status().shed_samples, 10'000U);
 }
 
 TEST_F(WriterTest, ExecuteWithdrawsLateCommands) {
@@ -406,9 +406,9 @@ TEST_F(WriterTest, NextStartAppliesTheSpool) {
   EXPECT_EQ(stored_mission.accounts.ledger[signals::Term::copper], 3.5);
   ASSERT_EQ(stored_mission.covariates.size(), 1U);
   EXPECT_EQ(stored_mission.covariates[0].mean, 0.25);
-  EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 30U);
+  EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).items.size(), 30U);
   EXPECT_EQ(need(store_.trace(m.key, {}, 10)).buckets.at(0).speed_m_s.max, 1.5);
-  EXPECT_EQ(need(store_.covariates(m.key, {}, {.limit = 10, .cursor = {}})).changes.at(0).name, "cpu_load");
+  EXPECT_EQ(need(store_.covariates(m.key, {}, {.limit = 10, .cursor = {}})).items.at(0).name, "cpu_load");
   EXPECT_EQ(need(store_.resume_state("amr-1"))->state_of_charge, 0.5);
   EXPECT_EQ(need(take_in_spool(spool, store_, refused)).commands, 0U) << "taken in once";
 }

@@ -50,7 +50,7 @@ class PipelineTest : public ::testing::Test {
   std::vector<signals::CovariateChange> changes(history::MissionKey key) {
     const auto page = harness.store->covariates(key, {}, {.limit = 10'000, .cursor = {}});
     EXPECT_TRUE(page);
-    return page ? page->changes : std::vector<signals::CovariateChange>{};
+    return page ? page->items : std::vector<signals::CovariateChange>{};
   }
   void send_range(std::int64_t from, std::int64_t to) {
     for (std::int64_t k = from; k < to; ++k) send(sample(k));
@@ -79,7 +79,7 @@ TEST_F(PipelineTest, AccountsAWholeMission) {
   EXPECT_EQ(trace->buckets.size(), 11u);
   const auto raw = harness.store->telemetry(missions[0].key, {}, {.limit = 1000, .cursor = {}});
   ASSERT_TRUE(raw);
-  EXPECT_EQ(raw->samples.size(), 501u);
+  EXPECT_EQ(raw->items.size(), 501u);
   EXPECT_TRUE(harness.warnings.empty());
 }
 
@@ -412,7 +412,7 @@ Carried carried(double declared_kg, const std::function<double(std::int64_t)>& s
   const history::Mission mission = harness.missions().at(1);
   const auto raw = harness.store->telemetry(mission.key, {}, {.limit = 1, .cursor = {}});
   return {mission.accounts.modelled_j, harness.fleet.find("nomad")->sample.payload_kg,
-          raw->samples.at(0).payload_kg, harness.faults(IngestFault::zero_payload)};
+          raw->items.at(0).payload_kg, harness.faults(IngestFault::zero_payload)};
 }
 
 TEST(PipelinePayload, DefaultsToTheDeclaredLoad) {

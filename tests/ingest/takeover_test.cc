@@ -122,7 +122,7 @@ class TakeoverTest : public ::testing::Test {
     std::vector<std::int64_t> numbers;
     const auto page = store.telemetry(key, {}, {.limit = 10'000, .cursor = {}});
     EXPECT_TRUE(page);
-    for (const Sample& s : page->samples) numbers.push_back(s.sequence);
+    for (const Sample& s : page->items) numbers.push_back(s.sequence);
     return numbers;
   }
 
