@@ -53,7 +53,7 @@ Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose
     options.start = pose;
     options.payload_kg = payload_kg;
     TRY_ASSIGN(const planning::Path path, path_of(task.way, options));
-    legs = forecast::planned_legs(path);
+    legs = planned_legs(path);
     for (PlannedLeg& leg : legs) {
       if (leg.run && (!task.way.placed || (knots += leg.run->knots.size()) > planning::most_rows))
         leg.run.reset();

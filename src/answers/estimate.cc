@@ -106,7 +106,7 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   TRY_ASSIGN(const auto path, path_of(drive.way, drive.options));
   const forecast::Forecaster& forecaster = *robot.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
-  const auto legs = forecast::planned_legs(path);
+  const auto legs = planned_legs(path);
   const auto priced =
       forecast::price(forecaster, pricer, legs, {}, drive.way.halts_stated() || forecast::states_halts(legs));
   if (const auto stuck = forecast::obstacle(pricer, legs, priced)) return tl::unexpected(*stuck);

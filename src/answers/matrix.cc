@@ -20,7 +20,6 @@
 namespace joulecast::answers {
 namespace {
 
-using forecast::Motion;
 using planning::Cell;
 using planning::CostTable;
 using planning::Obstacle;
@@ -37,17 +36,6 @@ double charge_that_suffices(Probability&& probability) {
     (probability(0.01 * middle) >= confidence ? high : low) = middle;
   }
   return high > 100 ? std::nan("") : 0.01 * high;
-}
-
-forecast::PlannedLeg leg_of(const planning::Stretch& stretch, double payload_kg) {
-  using Kind = planning::Stretch::Kind;
-  const double payload = stretch.loaded ? payload_kg : 0;
-  if (stretch.kind == Kind::stand) return {Motion::stand, 0, 0, payload, stretch.amount};
-  if (stretch.kind != Kind::other)
-    return {stretch.kind == Kind::turn ? Motion::turn : Motion::drive, stretch.amount, 0, payload, 0};
-  forecast::PlannedLeg leg = forecast::planned_leg(stretch.run);
-  leg.payload_kg = payload;
-  return leg;
 }
 
 using Json = nlohmann::json;
@@ -372,17 +360,12 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
   }
   const forecast::Forecaster& forecaster = *robot.outlook.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
-  std::vector<planning::Stretch> stretches;
-  std::vector<forecast::PlannedLeg> legs;
   for (std::size_t t = 0; t < cells.size(); ++t) {
     const planning::MatrixTask& task = input.tasks[t];
     Cell& cell = cells[t];
     cell.obstacle = planning::obstacle_of(task, robot.model->robot.limits.payload_kg, robot.pose.has_value());
     if (cell.obstacle != Obstacle::none) continue;
-    planning::stretches_of(task, r, robot.pose, stretches);
-    legs.clear();
-    for (const planning::Stretch& s : stretches)
-      if (s.amount > 0) legs.push_back(leg_of(s, task.payload_kg));
+    const auto legs = planning::legs_of(task, r, robot.pose);
     const bool halts_stated = task.stations.halts_stated() || forecast::states_halts(legs);
     const auto priced = forecast::price(forecaster, pricer, legs, {}, halts_stated);
     if (auto stuck = forecast::obstacle(pricer, legs, priced)) {

@@ -6,14 +6,14 @@
 #include <optional>
 #include <vector>
 
+#include "planning/path.h"
 #include "robot/robot_model.h"
 #include "signals/sample.h"
 
 namespace joulecast::forecast {
 
-// Kinds of motion that cost differently: standing, driving (straight or on curves), turning in place.
-enum class Motion { stand, drive, turn };
-inline constexpr std::size_t motion_count = 3;
+using planning::Motion;
+using planning::motion_count;
 
 // One segment of a past mission without change of its kind of motion: from stop to stop, or a halt.
 struct Leg {

@@ -18,20 +18,7 @@
 
 namespace joulecast::forecast {
 
-// A segment of a planned task, from stop to stop.
-struct PlannedLeg {
-  Motion motion = Motion::stand;
-  double way = 0;            // m, rad; 0 when standing
-  double curvature_1_m = 0;  // >= 0
-  double payload_kg = 0;
-  double duration_s = 0;                               // when standing
-  std::shared_ptr<const planning::Run> run = nullptr;  // of a path: its curvature, and where it is
-};
-
-// A run of varying curvature counts with the mean.
-PlannedLeg planned_leg(std::shared_ptr<const planning::Run> run);
-// The segments of a planned path: dwells and runs.
-std::vector<PlannedLeg> planned_legs(const planning::Path& path);
+using planning::PlannedLeg;
 
 // A leg's energy by a model [J]: the standing power over its duration, and the rest.
 struct LegCost {

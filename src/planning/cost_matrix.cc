@@ -13,54 +13,60 @@ double angle_between(double from, double to) {
   return std::remainder(to - from, 2 * std::numbers::pi);
 }
 
-// The segments of a leg go to `driver`, which has straight(m), turn(rad), other(run) and stand(s).
+PlannedLeg straight_leg(double distance_m) {
+  return {Motion::drive, distance_m};
+}
+PlannedLeg turn_leg(double angle_rad) {
+  return {Motion::turn, std::fabs(angle_rad)};
+}
+PlannedLeg dwell_leg(double duration_s) {
+  return {.duration_s = duration_s};
+}
 
-template <class Driver>
-void drive(const Leg& leg, Driver& driver) {
-  for (const double d : leg.distances_m) driver.straight(d);
-  for (const double a : leg.turns_rad) driver.turn(a);
-  for (const auto& run : leg.others) driver.other(run);
-  for (const double s : leg.dwells_s) driver.stand(s);
+// The segments of a way go to `drive`, in order.
+template <class Drive>
+void drive_leg(const Leg& leg, Drive& drive) {
+  for (const PlannedLeg& each : leg) drive(each);
 }
 
 // Turn towards the place, drive there, turn to its heading.
-template <class Driver>
-void drive_between(const Pose& from, const Station& to, Driver& driver) {
+template <class Drive>
+void drive_between(const Pose& from, const Station& to, Drive& drive) {
   const double dx = to.x_m - from.x_m, dy = to.y_m - from.y_m, distance = std::hypot(dx, dy);
   double heading = from.heading_rad;
   if (distance > same_place_m) {
     const double way = std::atan2(dy, dx);
-    driver.turn(angle_between(heading, way));
-    driver.straight(distance);
+    drive(turn_leg(angle_between(heading, way)));
+    drive(straight_leg(distance));
     heading = way;
   }
-  if (to.heading_rad) driver.turn(angle_between(heading, *to.heading_rad));
+  if (to.heading_rad) drive(turn_leg(angle_between(heading, *to.heading_rad)));
 }
 
-template <class Driver>
-void drive_loaded(const MatrixTask& task, Driver& driver) {
-  if (task.loaded) return drive(*task.loaded, driver);
+template <class Drive>
+void drive_loaded(const MatrixTask& task, Drive& drive) {
+  if (task.loaded) return drive_leg(*task.loaded, drive);
   // Without a heading at the pick-up the robot keeps its direction of arrival; see turn_at_pickup().
   const Station &from = *task.stations.pickup, &to = *task.stations.dropoff;
   const double way = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
-  drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, to, driver);
+  drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, to, drive);
 }
 
-template <class Driver>
-void drive_empty(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose, Driver& driver) {
-  if (task.empty.empty()) return drive_between(*pose, *task.stations.pickup, driver);
-  drive(task.empty.size() == 1 ? task.empty[0] : task.empty[robot], driver);
+template <class Drive>
+void drive_empty(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose, Drive& drive) {
+  if (task.empty.empty()) return drive_between(*pose, *task.stations.pickup, drive);
+  drive_leg(task.empty.size() == 1 ? task.empty[0] : task.empty[robot], drive);
 }
 
 // From the heading in which the robot came to a pick-up that has none, towards the drop-off.
-template <class Driver>
-void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Driver& driver) {
+template <class Drive>
+void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Drive& drive) {
   if (!task.empty.empty() || task.loaded || task.stations.pickup->heading_rad) return;
   const Station &from = *task.stations.pickup, &to = *task.stations.dropoff;
   if (!(std::hypot(to.x_m - from.x_m, to.y_m - from.y_m) > same_place_m)) return;
   const double dx = from.x_m - pose->x_m, dy = from.y_m - pose->y_m;
   const double arrived = std::hypot(dx, dy) > same_place_m ? std::atan2(dy, dx) : pose->heading_rad;
-  driver.turn(angle_between(arrived, std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)));
+  drive(turn_leg(angle_between(arrived, std::atan2(to.y_m - from.y_m, to.x_m - from.x_m))));
 }
 
 // Sums the costs in a table.
@@ -69,21 +75,15 @@ struct Pricer {
   double payload_kg = 0;
   std::stop_token stop = {};
   LegCost sum = {};
-  void straight(double distance_m) { sum += table.straight(distance_m, payload_kg); }
-  void turn(double angle_rad) { sum += table.turn(angle_rad, payload_kg); }
-  void other(const std::shared_ptr<const Run>& run) { sum += table.solved(*run, payload_kg, stop); }
-  void stand(double s) { sum += {table.idle_power_w() * s, s}; }
-};
-
-struct Recorder {
-  std::vector<Stretch>& into;
-  bool loaded = false;
-  void straight(double distance_m) { into.push_back({Stretch::Kind::straight, distance_m, loaded}); }
-  void turn(double angle_rad) { into.push_back({Stretch::Kind::turn, std::fabs(angle_rad), loaded}); }
-  void other(const std::shared_ptr<const Run>& run) {
-    into.push_back({Stretch::Kind::other, run->length(), loaded, run});
+  void operator()(const PlannedLeg& leg) {
+    if (leg.motion == Motion::stand)
+      sum += {table.idle_power_w() * leg.duration_s, leg.duration_s};
+    else if (leg.run)
+      sum += table.solved(*leg.run, payload_kg, stop);
+    else
+      sum +=
+          leg.motion == Motion::turn ? table.turn(leg.way, payload_kg) : table.straight(leg.way, payload_kg);
   }
-  void stand(double s) { into.push_back({Stretch::Kind::stand, s, loaded}); }
 };
 
 }  // namespace
@@ -95,18 +95,20 @@ std::string_view name_of(Obstacle obstacle) {
 }
 
 Leg leg_of(const Path& path) {
-  Leg leg;
+  Leg straights, turns, others, dwells;
   for (const Run& run : path.runs) {
-    leg.dwells_s.push_back(run.dwell_before_s);
+    dwells.push_back(dwell_leg(run.dwell_before_s));
     if (run.turn != 0 && run.length() <= widest_turn_rad)
-      leg.turns_rad.push_back(run.length());
+      turns.push_back(turn_leg(run.length()));
     else if (run.turn == 0 && run.straight() && run.length() <= longest_leg_m)
-      leg.distances_m.push_back(run.length());
+      straights.push_back(straight_leg(run.length()));
     else
-      leg.others.push_back(std::make_shared<const Run>(run));
+      others.push_back(planned_leg(std::make_shared<const Run>(run)));
   }
-  leg.dwells_s.push_back(path.dwell_after_s);
-  return leg;
+  dwells.push_back(dwell_leg(path.dwell_after_s));
+  for (const Leg* more : {&turns, &others, &dwells})
+    straights.insert(straights.end(), more->begin(), more->end());
+  return straights;
 }
 
 Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_known) {
@@ -114,15 +116,20 @@ Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_
   return task.empty.empty() && !pose_known ? Obstacle::pose : Obstacle::none;
 }
 
-void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
-                  std::vector<Stretch>& stretches) {
-  stretches.clear();
-  Recorder empty{stretches, false}, loaded{stretches, true};
-  drive_empty(task, robot, pose, empty);
-  empty.stand(task.stations.pickup_dwell_s.value_or(0));
-  turn_at_pickup(task, pose, loaded);
-  drive_loaded(task, loaded);
-  loaded.stand(task.stations.dropoff_dwell_s.value_or(0));
+std::vector<PlannedLeg> legs_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose) {
+  std::vector<PlannedLeg> legs;
+  double payload_kg = 0;
+  const auto add = [&](PlannedLeg leg) {
+    leg.payload_kg = payload_kg;
+    if (leg.way > 0 || leg.duration_s > 0) legs.push_back(std::move(leg));
+  };
+  drive_empty(task, robot, pose, add);
+  add(dwell_leg(task.stations.pickup_dwell_s.value_or(0)));
+  payload_kg = task.payload_kg;
+  turn_at_pickup(task, pose, add);
+  drive_loaded(task, add);
+  add(dwell_leg(task.stations.dropoff_dwell_s.value_or(0)));
+  return legs;
 }
 
 CostMatrix::CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> tasks)
@@ -147,7 +154,7 @@ const CostMatrix::Common& CostMatrix::common_legs(std::size_t table, const CostT
     for (const MatrixTask& task : tasks_) {
       Pricer loaded{costs, task.payload_kg, stop}, empty{costs, 0, stop};
       drive_loaded(task, loaded);
-      if (task.empty.size() == 1) drive(task.empty[0], empty);
+      if (task.empty.size() == 1) drive_leg(task.empty[0], empty);
       common.loaded.push_back(loaded.sum), common.empty.push_back(empty.sum);
     }
   });

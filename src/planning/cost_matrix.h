@@ -14,14 +14,9 @@
 
 namespace joulecast::planning {
 
-// A way between two stops: straight segments and turns in place, each from rest to rest, and runs that a cost
-// table does not contain.
-struct Leg {
-  std::vector<double> distances_m;
-  std::vector<double> turns_rad;
-  std::vector<std::shared_ptr<const Run>> others = {};
-  std::vector<double> dwells_s = {};
-};
+// A way between two stops, in this order: straight segments, turns in place, runs that a cost table does not
+// contain, and dwells. The task determines the payload.
+using Leg = std::vector<PlannedLeg>;
 Leg leg_of(const Path& path);
 
 // Where something is fetched or brought; the robot turns to `heading_rad` when there is one.
@@ -53,18 +48,9 @@ struct MatrixTask {
   std::optional<Leg> loaded;
 };
 
-// A part of a task's way, from rest to rest.
-struct Stretch {
-  enum class Kind { straight, turn, other, stand } kind = Kind::straight;
-  double amount = 0;  // m, rad or s; at least 0
-  bool loaded = false;
-  std::shared_ptr<const Run> run = nullptr;  // of `other`
-};
-
 // The segments that the robot of that row drives for a task, in order, with its dwells. `pose` is required
 // if the task has no empty leg.
-void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
-                  std::vector<Stretch>& stretches);
+std::vector<PlannedLeg> legs_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose);
 
 enum class Obstacle : unsigned char {
   none,

@@ -420,4 +420,28 @@ Result<Path> make_path(std::span<const Segment> segments, const PathOptions& opt
   return builder.finish();
 }
 
+PlannedLeg planned_leg(std::shared_ptr<const Run> run) {
+  PlannedLeg leg{run->turn != 0 ? Motion::turn : Motion::drive, run->length(), 0, run->payload_kg, 0, run};
+  if (run->turn != 0) return leg;
+  double turned = 0;
+  for (std::size_t k = 1; k < run->knots.size(); ++k) {
+    turned += 0.5 * (run->knots[k - 1].curvature_1_m + run->knots[k].curvature_1_m) *
+              (run->knots[k].way - run->knots[k - 1].way);
+  }
+  leg.curvature_1_m = std::fabs(turned) / leg.way;
+  return leg;
+}
+
+std::vector<PlannedLeg> planned_legs(const Path& path) {
+  std::vector<PlannedLeg> legs;
+  legs.reserve(2 * path.runs.size());
+  for (const Run& run : path.runs) {
+    if (run.dwell_before_s > 0) legs.push_back({Motion::stand, 0, 0, run.payload_kg, run.dwell_before_s});
+    legs.push_back(planned_leg(std::make_shared<const Run>(run)));
+  }
+  if (path.dwell_after_s > 0)
+    legs.push_back({Motion::stand, 0, 0, path.final_payload_kg, path.dwell_after_s});
+  return legs;
+}
+
 }  // namespace joulecast::planning

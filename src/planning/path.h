@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -113,6 +115,25 @@ struct PathOptions {
   // way deviates by at most jump * length^2 / 24.
   double transition_m = 0.2;
 };
+
+// Kinds of motion that cost differently: standing, driving (straight or on curves), turning in place.
+enum class Motion { stand, drive, turn };
+inline constexpr std::size_t motion_count = 3;
+
+// A segment of a planned task, from stop to stop.
+struct PlannedLeg {
+  Motion motion = Motion::stand;
+  double way = 0;            // m, rad; 0 when standing
+  double curvature_1_m = 0;  // >= 0
+  double payload_kg = 0;
+  double duration_s = 0;                     // when standing
+  std::shared_ptr<const Run> run = nullptr;  // of a path: its curvature, and where it is
+};
+
+// A run of varying curvature counts with the mean.
+PlannedLeg planned_leg(std::shared_ptr<const Run> run);
+// The segments of a planned path: dwells and runs.
+std::vector<PlannedLeg> planned_legs(const Path& path);
 
 // Errors name "/segments/<index>/<field>".
 Result<Path> make_path(std::span<const Segment> segments, const PathOptions& options = {});

@@ -92,8 +92,8 @@ TEST(CostMatrix, CellsArePlans) {
   heavy.payload_kg = 100;  // the tug's, not the AMR's
   MatrixTask legs;
   legs.payload_kg = 20;
-  legs.empty = {Leg{{4, 2}, {1.2}}, Leg{{8}, {}}};
-  legs.loaded = Leg{{3}, {-0.5, 0.7}};
+  legs.empty = {Leg{{Motion::drive, 4}, {Motion::drive, 2}, {Motion::turn, 1.2}}, Leg{{Motion::drive, 8}}};
+  legs.loaded = Leg{{Motion::drive, 3}, {Motion::turn, 0.5}, {Motion::turn, 0.7}};
   const std::vector<Segment> bends = {Straight{3}, Arc{2, 1.2}, Dwell{4}, TurnInPlace{-0.5}, Straight{3}};
   MatrixTask curves = legs;
   curves.empty = {leg_of(*make_path(bends))};
@@ -141,8 +141,8 @@ TEST(CostMatrix, ReportsLimitsWithoutMotion) {
   std::vector<MatrixTask> tasks(3);
   for (const std::size_t t : {0u, 1u, 2u}) {
     tasks[t].payload_kg = 30 * static_cast<double>(t);
-    tasks[t].empty = {Leg{{4}, {}}};
-    tasks[t].loaded = Leg{{4}, {1}};
+    tasks[t].empty = {Leg{{Motion::drive, 4}}};
+    tasks[t].loaded = Leg{{Motion::drive, 4}, {Motion::turn, 1}};
   }
   for (const robot::RobotModel& robot : {weak, high_ohmic, rolling}) {
     const auto table = CostTable::make(robot, {});
