@@ -281,36 +281,7 @@ const Input<MatrixInput, MatrixContext>& matrix_input() {
 
 }  // namespace
 
-struct Matrix::State {
-  struct Robot {
-    std::shared_ptr<const ModelInForce> model;  // null: see `problem`
-    std::string problem;
-    std::optional<planning::Pose> pose;
-    std::optional<forecast::Charge> charge;
-    double to_full_s = std::nan("");  // at the charger
-    RobotOutlook outlook;             // where the charge is available or usual driving is requested
-  };
-
-  MatrixInput input;
-  std::vector<Robot> robots;
-  planning::CostTableCache& cache;
-
-  // Of minimum-energy driving: tables, one for each different model, then the matrix.
-  std::vector<const ModelInForce*> models = {};
-  std::vector<Result<std::shared_ptr<const CostTable>>> tables = {};
-  std::size_t tables_done = 0;
-  std::unique_ptr<planning::CostMatrix> matrix = {};
-
-  Robot robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const;
-  void assemble();
-  std::vector<Cell> usual_cells(std::size_t r, MatrixRow& out, std::optional<Error>& obstacle) const;
-  void state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const;
-  static void state_availability(const Robot& robot, MatrixRow& out);
-  std::string detail_of(Obstacle obstacle, std::size_t r, const std::optional<Error>& limits) const;
-};
-
-Matrix::State::Robot Matrix::State::robot_of(const MatrixInput::Robot& given,
-                                             const MatrixFleet& fleet) const {
+Matrix::Robot Matrix::robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const {
   Robot robot;
   auto model = fleet.model(given.robot_id);
   if (!model) {
@@ -321,39 +292,38 @@ Matrix::State::Robot Matrix::State::robot_of(const MatrixInput::Robot& given,
   const LiveRobot now = fleet.live(given.robot_id);
   robot.pose = given.pose ? given.pose : now.pose;
   if (const auto charge =
-          charge_of(given.state_of_charge, {}, input.reserve_fraction, robot.model->robot.battery, now))
+          charge_of(given.state_of_charge, {}, input_.reserve_fraction, robot.model->robot.battery, now))
     robot.charge = *charge;
   if (!given.state_of_charge && battery::at_charger(now.charging)) robot.to_full_s = now.to_full.duration_s;
-  if (robot.charge || input.driving == Driving::usual) robot.outlook = fleet.outlook(robot.model);
+  if (robot.charge || input_.driving == Driving::usual) robot.outlook = fleet.outlook(robot.model);
   return robot;
 }
 
-void Matrix::State::assemble() {
+void Matrix::assemble() {
   std::unordered_map<const ModelInForce*, std::size_t> table_of;
-  for (std::size_t k = 0; k < models.size(); ++k) {
+  for (std::size_t k = 0; k < models_.size(); ++k) {
     // Every model in force and every option has been checked, so that a missing table is a bug.
-    if (!tables[k]) throw std::logic_error(describe(tables[k].error()));
-    table_of.emplace(models[k], k);
+    if (!tables_[k]) throw std::logic_error(describe(tables_[k].error()));
+    table_of.emplace(models_[k], k);
   }
   std::vector<planning::MatrixRobot> rows;
-  rows.reserve(robots.size());
-  for (const Robot& robot : robots) {
+  rows.reserve(robots_.size());
+  for (const Robot& robot : robots_) {
     if (robot.model == nullptr) {
       rows.emplace_back();
       continue;
     }
     rows.push_back(
-        {*tables[table_of.at(robot.model.get())], robot.model->robot.limits.payload_kg, robot.pose});
+        {*tables_[table_of.at(robot.model.get())], robot.model->robot.limits.payload_kg, robot.pose});
   }
-  matrix = std::make_unique<planning::CostMatrix>(std::move(rows), input.tasks);
+  matrix_ = std::make_unique<planning::CostMatrix>(std::move(rows), input_.tasks);
 }
 
 // Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts. The reason
 // why cells are beyond the motors is stored in `obstacle`.
-std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
-                                             std::optional<Error>& obstacle) const {
-  const Robot& robot = robots[r];
-  std::vector<Cell> cells(input.tasks.size());
+std::vector<Cell> Matrix::usual_cells(std::size_t r, MatrixRow& out, std::optional<Error>& obstacle) const {
+  const Robot& robot = robots_[r];
+  std::vector<Cell> cells(input_.tasks.size());
   if (robot.model == nullptr) {
     for (Cell& cell : cells) cell.obstacle = Obstacle::model;
     return cells;
@@ -361,7 +331,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
   const forecast::Forecaster& forecaster = *robot.outlook.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
   for (std::size_t t = 0; t < cells.size(); ++t) {
-    const planning::MatrixTask& task = input.tasks[t];
+    const planning::MatrixTask& task = input_.tasks[t];
     Cell& cell = cells[t];
     cell.obstacle = planning::obstacle_of(task, robot.model->robot.limits.payload_kg, robot.pose.has_value());
     if (cell.obstacle != Obstacle::none) continue;
@@ -390,7 +360,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
 
 // The probability that a robot driving by minimum-energy profiles ends each task with its reserve, and the
 // charge with which it does.
-void Matrix::State::state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const {
+void Matrix::state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const {
   const auto possible = std::ranges::find_if(cells, [](const Cell& c) { return c.duration_s > 0; });
   const double standing_w = robot.model->drive.battery_power_for({0, 0});
   const double power_w = possible != cells.end() ? possible->energy_j / possible->duration_s : standing_w;
@@ -406,7 +376,7 @@ void Matrix::State::state_success(const Robot& robot, const std::vector<Cell>& c
     if (!std::isfinite(cell.energy_j)) continue;
     const auto probability = [&](const forecast::QuickSuccess& quick) {
       return quick.probability(cell.energy_j, cell.duration_s, cell.loaded.energy_j, cell.loaded.duration_s,
-                               input.tasks[t].payload_kg);
+                               input_.tasks[t].payload_kg);
     };
     (*out.success_probability)[t] = probability(now);
     if ((*out.success_probability)[t] >= confidence) continue;
@@ -419,7 +389,7 @@ void Matrix::State::state_success(const Robot& robot, const std::vector<Cell>& c
 }
 
 // A charger's current falls, if at all, towards its end: charge that arrived evenly is no earlier.
-void Matrix::State::state_availability(const Robot& robot, MatrixRow& out) {
+void Matrix::state_availability(const Robot& robot, MatrixRow& out) {
   for (std::size_t t = 0; t < out.success_probability->size(); ++t) {
     const double now = robot.charge->fraction, needed = (*out.charge_needed)[t];
     if ((*out.success_probability)[t] >= confidence)
@@ -429,88 +399,77 @@ void Matrix::State::state_availability(const Robot& robot, MatrixRow& out) {
   }
 }
 
-std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r,
-                                     const std::optional<Error>& limits) const {
+std::string Matrix::detail_of(Obstacle obstacle, std::size_t r, const std::optional<Error>& limits) const {
   switch (obstacle) {
     case Obstacle::none:
       break;
     case Obstacle::payload:
-      return fmt::format("this robot carries at most {} kg", robots[r].model->robot.limits.payload_kg);
+      return fmt::format("this robot carries at most {} kg", robots_[r].model->robot.limits.payload_kg);
     case Obstacle::limits:
       return limits ? describe(*limits) : std::string("no motion within the limits");
     case Obstacle::pose:
       return "the robot reports no pose; state it in the request, or the way to the pick-up";
     case Obstacle::model:
-      return robots[r].problem;
+      return robots_[r].problem;
   }
   return {};
 }
 
 Matrix::Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables)
-    : state_(new State{.input = std::move(input), .robots = {}, .cache = tables}) {
-  State& s = *state_;
-  s.robots.reserve(s.input.robots.size());
-  for (const MatrixInput::Robot& given : s.input.robots) s.robots.push_back(s.robot_of(given, fleet));
-  if (s.input.driving == Driving::usual) return;
+    : input_(std::move(input)), cache_(tables) {
+  robots_.reserve(input_.robots.size());
+  for (const MatrixInput::Robot& given : input_.robots) robots_.push_back(robot_of(given, fleet));
+  if (input_.driving == Driving::usual) return;
   std::unordered_map<const ModelInForce*, bool> seen;
-  for (const State::Robot& robot : s.robots)
+  for (const Robot& robot : robots_)
     if (robot.model != nullptr && seen.emplace(robot.model.get(), true).second)
-      s.models.push_back(robot.model.get());
-  s.tables.assign(s.models.size(), std::shared_ptr<const CostTable>());
-}
-
-Matrix::~Matrix() = default;
-Matrix::Matrix(Matrix&&) noexcept = default;
-
-const MatrixInput& Matrix::input() const {
-  return state_->input;
+      models_.push_back(robot.model.get());
+  tables_.assign(models_.size(), std::shared_ptr<const CostTable>());
 }
 
 bool Matrix::prepare(std::chrono::milliseconds time, const std::stop_token& stop) {
-  State& s = *state_;
-  if (s.tables_done == s.models.size()) {
-    if (s.matrix == nullptr && s.input.driving == Driving::minimum_energy) s.assemble();
+  if (tables_done_ == models_.size()) {
+    if (matrix_ == nullptr && input_.driving == Driving::minimum_energy) assemble();
     return false;
   }
   const auto until = std::chrono::steady_clock::now() + time;
-  std::atomic<std::size_t> next = s.tables_done;
+  std::atomic<std::size_t> next = tables_done_;
   parallel_for(threads, threads, [&](std::size_t) {
     do {
       const std::size_t k = next++;
-      if (k >= s.models.size()) return;
-      s.tables[k] = s.cache.get(s.models[k]->robot, s.input.options, stop);
+      if (k >= models_.size()) return;
+      tables_[k] = cache_.get(models_[k]->robot, input_.options, stop);
     } while (!stop.stop_requested() && std::chrono::steady_clock::now() < until);
   });
-  s.tables_done = std::min(next.load(), s.models.size());
+  tables_done_ = std::min(next.load(), models_.size());
   return true;
 }
 
 MatrixRow Matrix::row(std::size_t r, const std::stop_token& stop) const {
-  const State& s = *state_;
-  const State::Robot& robot = s.robots[r];
+  const Robot& robot = robots_[r];
   MatrixRow out;
-  out.robot_id = s.input.robots[r].robot_id;
+  out.robot_id = input_.robots[r].robot_id;
   out.siblings_pending = robot.outlook.siblings_pending;
   std::vector<Cell> cells;
   std::optional<Error> limits;  // that some cells break
   if (robot.charge)
     for (auto* column : {&out.success_probability, &out.charge_needed, &out.available_in_s})
-      column->emplace(s.input.tasks.size(), std::nan(""));
-  if (s.input.driving == Driving::usual) {
-    cells = s.usual_cells(r, out, limits);
+      column->emplace(input_.tasks.size(), std::nan(""));
+  if (input_.driving == Driving::usual) {
+    cells = usual_cells(r, out, limits);
   } else {
-    s.matrix->row(r, cells, stop);
-    if (robot.charge) s.state_success(robot, cells, out);
+    matrix_->row(r, cells, stop);
+    if (robot.charge) state_success(robot, cells, out);
   }
-  if (robot.charge) State::state_availability(robot, out);
+  if (robot.charge) state_availability(robot, out);
   if (robot.model != nullptr) {
     out.model_version = robot.model->version;
     const auto effects = *dynamics::active_effects(robot.model->robot);
     for (const dynamics::ActiveEffect& active : effects)
       if (active.effect->info().depends_on_place())
         out.neglected_effects.emplace_back(active.effect->info().id);
-    if (s.matrix != nullptr) {
-      const CostTable& table = *s.matrix->robot(r).table;
+    if (matrix_ != nullptr) {
+      const CostTable& table = *matrix_->robot(r).table;
       out.interpolation_error = table.interpolation_error();
       limits = table.obstacle();
     }
@@ -522,9 +481,9 @@ MatrixRow Matrix::row(std::size_t r, const std::stop_token& stop) const {
   for (const Obstacle obstacle : {Obstacle::model, Obstacle::pose, Obstacle::payload, Obstacle::limits}) {
     std::vector<std::string> task_ids;
     for (std::size_t t = 0; t < cells.size(); ++t)
-      if (cells[t].obstacle == obstacle) task_ids.push_back(s.input.task_ids[t]);
+      if (cells[t].obstacle == obstacle) task_ids.push_back(input_.task_ids[t]);
     if (!task_ids.empty())
-      out.infeasible.push_back({obstacle, s.detail_of(obstacle, r, limits), std::move(task_ids)});
+      out.infeasible.push_back({obstacle, detail_of(obstacle, r, limits), std::move(task_ids)});
   }
   return out;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -65,10 +66,8 @@ struct MatrixRow {
 class Matrix {
  public:
   Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables);
-  ~Matrix();
-  Matrix(Matrix&&) noexcept;
 
-  const MatrixInput& input() const;
+  const MatrixInput& input() const { return input_; }
 
   // Builds cost tables, on two threads, for at most `time`; false when all are built.
   bool prepare(std::chrono::milliseconds time, const std::stop_token& stop = {});
@@ -76,8 +75,32 @@ class Matrix {
   MatrixRow row(std::size_t robot, const std::stop_token& stop = {}) const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  struct Robot {
+    std::shared_ptr<const ModelInForce> model;  // null: see `problem`
+    std::string problem;
+    std::optional<planning::Pose> pose;
+    std::optional<forecast::Charge> charge;
+    double to_full_s = std::nan("");  // at the charger
+    RobotOutlook outlook;             // where the charge is available or usual driving is requested
+  };
+
+  Robot robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const;
+  void assemble();
+  std::vector<planning::Cell> usual_cells(std::size_t r, MatrixRow& out,
+                                          std::optional<Error>& obstacle) const;
+  void state_success(const Robot& robot, const std::vector<planning::Cell>& cells, MatrixRow& out) const;
+  static void state_availability(const Robot& robot, MatrixRow& out);
+  std::string detail_of(planning::Obstacle obstacle, std::size_t r, const std::optional<Error>& limits) const;
+
+  MatrixInput input_;
+  std::vector<Robot> robots_;
+  planning::CostTableCache& cache_;
+
+  // Of minimum-energy driving: tables, one for each different model, then the matrix.
+  std::vector<const ModelInForce*> models_;
+  std::vector<Result<std::shared_ptr<const planning::CostTable>>> tables_;
+  std::size_t tables_done_ = 0;
+  std::unique_ptr<planning::CostMatrix> matrix_;
 };
 
 // "energy-matrix-request", "energy-matrix" and those to which they refer.
