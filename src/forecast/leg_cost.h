@@ -1,10 +1,6 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
-#include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 

@@ -10,7 +10,6 @@
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "history/open_store.h"
-#include "history/sql_queries.h"
 #include "history/sql_rows.h"
 #include "history/store.h"
 

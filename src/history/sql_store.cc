@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "access/sha256.h"
-#include "history/sql_queries.h"
 
 namespace joulecast::history {
 

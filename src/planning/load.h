@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "dynamics/drive_model.h"
 #include "dynamics/straight.h"
