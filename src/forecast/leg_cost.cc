@@ -17,10 +17,6 @@ LegPricer::LegPricer(const robot::RobotModel& robot, const dynamics::DriveModel&
       current_limit_a_(robot.limits.current_a),
       standing_w_(drive.battery_power_for({0, 0})) {}
 
-LegCost LegPricer::standing(double duration_s) const {
-  return {duration_s, standing_w_ * duration_s, 0, 0};
-}
-
 dynamics::Instant LegPricer::instant(const Power& kind, double v, double a) const {
   const dynamics::Parameters<double>& p = drive_->parameters();
   const bool turning = kind.motion == Motion::turn;

@@ -55,7 +55,7 @@ class LegPricer {
   Reachable reachable(Motion motion, double curvature_1_m, double payload_kg, const Cruise& wanted) const;
   // Of a leg that is impossible: the limit that prevents motion, and the value that motion requires.
   Error obstacle(const PlannedLeg& leg) const;
-  LegCost standing(double duration_s) const;
+  LegCost standing(double duration_s) const { return {duration_s, standing_w_ * duration_s, 0, 0}; }
 
  private:
   // Power beyond standing of one kind of motion with one payload and curvature.

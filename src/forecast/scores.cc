@@ -171,10 +171,6 @@ double Prediction::at_score(double z) const {
   return planning::zero_between(off, least, at_low, longest, at_longest, close);
 }
 
-double Prediction::quantile(double probability) const {
-  return at_score(inflation * scores->quantile(probability));
-}
-
 double Prediction::probability_below(double amount, double deviation) const {
   const auto budget_covers = [&](double spent) {
     if (!(deviation > 0)) return spent <= amount ? 1.0 : 0.0;

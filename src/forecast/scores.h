@@ -97,7 +97,7 @@ struct Prediction {
 
   // The sum of the legs' means, as corrected amounts are means.
   double expected() const { return fixed + legs + halts.mean(); }
-  double quantile(double probability) const;
+  double quantile(double probability) const { return at_score(inflation * scores->quantile(probability)); }
   // The probability of at most an amount with a standard deviation (0: exact).
   double probability_below(double amount, double deviation = 0) const;
   // The score of the measured amount: the normal deviate with the probability of staying below it.

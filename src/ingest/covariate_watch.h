@@ -24,9 +24,6 @@ namespace joulecast::ingest {
 // computed from pitch or height.
 class CovariateWatch {
  public:
-  // Values behind the last one of their name by more than `reorder_us` show a clock set back.
-  explicit CovariateWatch(std::int64_t reorder_us) : tracker_(reorder_us) {}
-
   // Takes a message with a plausible clock; `fault` is called with every value refused, and why.
   using Fault = std::function<void(IngestFault, std::string why)>;
   void take(const signals::CovariateMessage& message, const Fault& fault);

@@ -34,15 +34,13 @@ RobotSession::RobotSession(const StoredRobot& stored, const SessionSettings& set
     : robot_id_(stored.robot_id),
       settings_(settings),
       outputs_(std::move(outputs)),
-      order_(settings.reorder_us, settings.sequence.backward_jump_us,
+      order_(settings.reorder_us, telemetry::SequenceLimits{}.backward_jump_us,
              [this](const signals::Sample& sample) { place(sample); }),
-      sequence_(settings.sequence),
       missions_(settings.mission),
       gaps_(settings.meter.gap_bridge_s),
       refinement_memory_(stored.refinement_memory),
       charge_memory_(stored.charge_memory),
       stored_contradictions_(stored.contradictions),
-      covariates_(settings.mission.reorder_us),
       event_allowance_(settings.event_rate_hz) {
   snapshot_.robot_id = robot_id_;
   if (stored.state) {

@@ -93,7 +93,6 @@ class FaultLog {
 
 struct SessionSettings {
   energy::MeterSettings meter;
-  telemetry::SequenceLimits sequence;
   telemetry::MissionLimits mission;
   bool implicit_missions = true;
   std::int64_t reorder_us = 500'000;  // how long samples wait for one that is missing before them

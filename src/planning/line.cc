@@ -169,14 +169,6 @@ double LineProfile::peak_acceleration() const {
   return std::max(std::fabs(start_acceleration_), std::fabs(end_acceleration_));
 }
 
-double LineProfile::transversality_w() const {
-  return power_.c0 + value_of_time_ + power_.c1 * invariant();
-}
-
-double LineProfile::distance_multiplier() const {
-  return -power_.c3 - 2 * power_.c1 * thrust_;
-}
-
 Result<LineProfile> line_in_free_time(const LineTask& task) {
   TRY(validate(task));
   const double price = task.power.c0 + task.value_of_time_w;

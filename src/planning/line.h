@@ -44,10 +44,10 @@ class LineProfile {
 
   // H(t_f) + value of time, thesis (4-13) [W]: how fast the cost grows with the end time. Zero at the free
   // one.
-  double transversality_w() const;
+  double transversality_w() const { return power_.c0 + value_of_time_ + power_.c1 * invariant(); }
 
   // The multiplier lambda_1 of the distance, thesis (4-9) [W s/x].
-  double distance_multiplier() const;
+  double distance_multiplier() const { return -power_.c3 - 2 * power_.c1 * thrust_; }
 
  private:
   double invariant() const;  // k^2 v^2 - a^2 - 2 B v, constant along the profile

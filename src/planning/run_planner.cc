@@ -647,11 +647,10 @@ Result<void> RunPlanner::build_grid() {
   return check_feasible();
 }
 
-std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) const {
+std::optional<RunAnswer> RunPlanner::closed_form(double price_w) const {
   if (!line_) return {};
   const Electric& e = loads_->electric();
   LineTask task = *line_;
-  task.distance = length;
   task.value_of_time_w = price_w;
   const Ceiling highest = ceiling(0);
   const auto line = line_within(task, std::sqrt(highest.square), acceleration_limit());

@@ -51,9 +51,8 @@ class RunPlanner {
                           const std::optional<Due>& due = {});
   // The same on a first grid, which errs by some thousandths: near enough to search for a price of time.
   Result<RunAnswer> solve_roughly(double price_w, const std::stop_token& stop = {});
-  // Where the closed form answers, over the run's length or another one.
-  std::optional<RunAnswer> closed_form(double price_w) const { return closed_form(price_w, run_->length()); }
-  std::optional<RunAnswer> closed_form(double price_w, double length) const;
+  // Where the closed form answers.
+  std::optional<RunAnswer> closed_form(double price_w) const;
 
   // Of a uniform run from rest to rest, of the resulting length, in free time: the motion that turns at
   // `peak`, up to the speed at which long ways are driven. Empty where neither the closed form nor the

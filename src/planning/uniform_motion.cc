@@ -43,10 +43,6 @@ tl::unexpected<Error> endless(double standing_w) {
                   " W, must be positive for a best end time to exist; a deadline_s bounds it too");
 }
 
-double UniformMotion::Piece::duration_s() const {
-  return std::fabs(to - from) / acceleration;
-}
-
 bool UniformMotion::has_motor_limits() const {
   return std::isfinite(task_.torque_limit_nm) || std::isfinite(task_.voltage_limit_v);
 }
@@ -186,10 +182,6 @@ double UniformMotion::level(const Local& l, double direction, double rate_w, dou
     a = next;
   }
   return a;
-}
-
-double UniformMotion::steady_cost(double v, double fixed_w) const {
-  return (motors(local(v), 0).w + fixed_w) / v;
 }
 
 double UniformMotion::cheapest_speed(double fixed_w) const {

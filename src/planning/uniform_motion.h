@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -88,8 +89,6 @@ class UniformMotion {
   RestMotion to_peak(double peak, double price_w) const;
   // The speed at which long ways are driven.
   double cruise_speed(double price_w) const { return cheapest_speed(task_.electric.idle_w + price_w); }
-  // At that speed.
-  double steady_power_w(double v) const { return motors(local(v), 0).w + task_.electric.idle_w; }
 
  private:
   // The motors' torques at a speed, acceleration left out.
@@ -122,7 +121,7 @@ class UniformMotion {
     Bound bound = Bound::acceleration;
     bool bounded = false;
 
-    double duration_s() const;
+    double duration_s() const { return std::fabs(to - from) / acceleration; }
     double distance() const { return 0.5 * (from + to) * duration_s(); }
   };
   // From the start speed to the end speed by way of a third; the rest of the way is driven at that one.
@@ -140,7 +139,7 @@ class UniformMotion {
   Most most(const Local& l, double direction, double tolerance) const;
   double best(const Local& l, double direction, double rate_w, double most) const;
   double level(const Local& l, double direction, double rate_w, double most) const;
-  double steady_cost(double v, double fixed_w) const;
+  double steady_cost(double v, double fixed_w) const { return (motors(local(v), 0).w + fixed_w) / v; }
   double cheapest_speed(double fixed_w) const;
   double stretch(double pivot, double end, const Price& price) const;
   bool has_motor_limits() const;

@@ -23,7 +23,7 @@ CovariateTracker::Verdict CovariateTracker::take(std::int64_t utime_us, const si
     held_.emplace(covariate.name, Held{utime_us, covariate.value});
   } else {
     Held& held = known->second;
-    clock_set = utime_us < held.utime_us - reorder_us_;
+    clock_set = utime_us < held.utime_us - reorder_us;
     if (utime_us < held.utime_us && !clock_set) return Verdict::late;
     if (signals::same(held.value, covariate.value)) {
       held.utime_us = utime_us;

@@ -22,9 +22,6 @@ class CovariateTracker {
     no_room,  // a name beyond max_covariates
   };
 
-  // A value older by more than `reorder_us` than the one that holds shows a clock set back, and is news.
-  explicit CovariateTracker(std::int64_t reorder_us = 5'000'000) : reorder_us_(reorder_us) {}
-
   // Takes one value of a message; `change` is set where it is news. Within a mission no change is earlier
   // than the mission's start.
   Verdict take(std::int64_t utime_us, const signals::Covariate& covariate, signals::CovariateChange& change);
@@ -44,7 +41,9 @@ class CovariateTracker {
     double value = signals::unmeasured;
   };
 
-  std::int64_t reorder_us_;
+  // A value older by more than this than the one that holds shows a clock set back, and is news.
+  static constexpr std::int64_t reorder_us = 5'000'000;
+
   std::int64_t mission_start_us_ = INT64_MIN;
   std::map<std::string, Held, std::less<>> held_;
 };

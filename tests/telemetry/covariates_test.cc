@@ -35,7 +35,7 @@ TEST(Covariates, ReportsOnlyChanges) {
 }
 
 TEST(Covariates, EarlierClockIsNotLate) {
-  CovariateTracker tracker(5'000'000);
+  CovariateTracker tracker;
   EXPECT_EQ(take(tracker, 3'600'000'000, "load", 0.5), Verdict::news);
   EXPECT_EQ(take(tracker, 3'596'000'000, "load", 0.6), Verdict::late);
   EXPECT_EQ(take(tracker, 1'000'000, "load", 0.7), Verdict::news);
