@@ -10,13 +10,13 @@
 #include <numbers>
 #include <utility>
 
-#include "answers/least_energy.h"
 #include "answers/mission.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
 namespace {
 
+using forecast::LegCost;
 using forecast::Motion;
 using forecast::PlannedLeg;
 using forecast::PricedLeg;
@@ -88,21 +88,123 @@ Result<Pricing> as_usual(const AutonomyInput& input, const TaskPlan& plan, const
   return priced;
 }
 
-Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
-  Pricing priced;
-  const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
-                       std::vector<PricedLeg>& into) -> Result<void> {
-    TRY_ASSIGN(into, least.price(legs));
-    return {};
-  };
-  for (const TaskPlan::Task& task : plan.tasks) {
-    PricedTask& into = priced.tasks.emplace_back();
-    TRY(add(task.legs, into.legs));
-    TRY(add(task.to_charger, into.to_charger));
+// Prices legs driven as the planner would: minimum energy from stop to stop, within the robot's limits. In
+// free time straight legs and turns come from the robot's cost table, which is made once for its model (some
+// tenths of a second) and kept; curves, all legs where a second has its price, and those of paths where the
+// floor has effects, are solved one by one, equal ones once.
+class LeastEnergy {
+ public:
+  // All end with an error when the token is set. The planner's drives are followed by no halts but those
+  // among the legs. Error: a leg that cannot be driven within the limits.
+  static Result<LeastEnergy> make(const ModelInForce& model, planning::CostTableCache& tables,
+                                  double value_of_time_w, const std::stop_token& stop) {
+    LeastEnergy least(model, value_of_time_w, stop);
+    if (!(value_of_time_w > 0)) {
+      TRY_ASSIGN(least.table_, tables.get(model.robot, {}, stop));
+    }
+    return least;
   }
-  TRY(add(plan.from_here, priced.from_here));
-  return priced;
-}
+  Result<Pricing> price(const TaskPlan& plan) {
+    Pricing priced;
+    for (const TaskPlan::Task& task : plan.tasks) {
+      PricedTask& into = priced.tasks.emplace_back();
+      TRY_ASSIGN(into.legs, price(task.legs));
+      TRY_ASSIGN(into.to_charger, price(task.to_charger));
+    }
+    TRY_ASSIGN(priced.from_here, price(plan.from_here));
+    return priced;
+  }
+  Result<std::vector<PricedLeg>> price(const std::vector<PlannedLeg>& legs) {
+    std::vector<PricedLeg> priced;
+    priced.reserve(legs.size());
+    for (const PlannedLeg& leg : legs) {
+      TRY_ASSIGN(const LegCost best, cost(leg));
+      priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, best,
+                        forecast::Driving::stated, false});
+    }
+    return priced;
+  }
+
+ private:
+  struct Solved {
+    PlannedLeg leg;
+    planning::LegCost cost;
+  };
+
+  LeastEnergy(const ModelInForce& model, double value_of_time_w, std::stop_token stop)
+      : model_(&model),
+        standing_w_(model.drive.battery_power_for({0, 0})),
+        value_of_time_w_(value_of_time_w),
+        stop_(std::move(stop)) {
+    const auto effects = dynamics::active_effects(model.robot);
+    on_floor_ = effects && std::ranges::any_of(*effects, [](const dynamics::ActiveEffect& active) {
+                  return active.effect->info().depends_on_place();
+                });
+  }
+
+  Result<LegCost> cost(const PlannedLeg& leg) {
+    if (leg.motion == Motion::stand || !(leg.way > 0))
+      return LegCost{leg.duration_s, standing_w_ * leg.duration_s, 0, 0};
+    planning::LegCost best;
+    const bool in_table = table_ != nullptr && !(on_floor_ && leg.run);
+    const bool straight = leg.run ? leg.run->straight() : leg.curvature_1_m == 0;
+    if (in_table && leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
+      best = table_->turn(leg.way, leg.payload_kg);
+    } else if (in_table && leg.motion == Motion::drive && straight && leg.way <= planning::longest_leg_m) {
+      best = table_->straight(leg.way, leg.payload_kg);
+    } else {
+      TRY_ASSIGN(best, solved(leg));
+    }
+    if (!std::isfinite(best.energy_j))
+      return fail(Fault::infeasible, "/tasks",
+                  "no motion of one of the legs keeps within the robot's limits");
+    LegCost cost;
+    cost.duration_s = best.duration_s;
+    cost.standing_j = standing_w_ * best.duration_s;
+    cost.motor_j = best.energy_j - cost.standing_j;
+    const robot::Limits& limits = model_->robot.limits;
+    const double limit = leg.motion == Motion::turn ? limits.yaw_rate_rad_s : limits.speed_m_s;
+    constexpr double peak_over_mean = 1.25;  // between a parabola's 1.5 and a plateau's 1
+    cost.speed_fraction = std::min(1.0, peak_over_mean * leg.way / best.duration_s / limit);
+    return cost;
+  }
+
+  // Whether the planner's costs of two legs are equal wherever they begin.
+  bool same(const PlannedLeg& a, const PlannedLeg& b) const {
+    if (a.motion != b.motion || a.way != b.way || a.curvature_1_m != b.curvature_1_m ||
+        a.payload_kg != b.payload_kg)
+      return false;
+    if (a.run == b.run || !a.run || !b.run) return a.run == b.run;
+    return !on_floor_ && std::ranges::equal(a.run->knots, b.run->knots, [](const auto& k, const auto& l) {
+      return k.way == l.way && k.curvature_1_m == l.curvature_1_m;
+    });
+  }
+
+  Result<planning::LegCost> solved(const PlannedLeg& leg) {
+    const auto known = [&](const Solved& other) { return same(other.leg, leg); };
+    if (const auto found = std::ranges::find_if(solved_, known); found != solved_.end()) return found->cost;
+    planning::Run run;
+    if (leg.run) {
+      run = *leg.run;
+    } else {
+      if (leg.motion == Motion::turn) run.turn = 1;
+      run.knots = {{0, leg.curvature_1_m, {}}, {leg.way, leg.curvature_1_m, {}}};
+    }
+    planning::Problem problem;
+    problem.limits = planning::limits_of(model_->robot);
+    problem.value_of_time_w = value_of_time_w_;
+    TRY_ASSIGN(const auto best, model_->planner.cost(std::move(run), leg.payload_kg, problem, stop_));
+    solved_.push_back({leg, {best.energy_j, best.duration_s}});
+    return solved_.back().cost;
+  }
+
+  std::shared_ptr<const planning::CostTable> table_;  // null where a second has its price
+  const ModelInForce* model_;
+  double standing_w_, value_of_time_w_;
+  std::stop_token stop_;
+  bool on_floor_ = false;  // effects of places and headings are in force
+  std::vector<Solved> solved_;
+};
 
 // By halving the logarithm of what a second costs, the standing robot's power included. `look` makes the
 // outlook of a pricing.
@@ -118,7 +220,7 @@ Result<std::optional<FastestDriving>> fastest_driving(const TaskPlan& plan, cons
     const double x = k == 0 ? fast : k == 1 ? slow : 0.5 * (slow + fast);
     const double value_of_time_w = k == 1 ? 0 : std::exp(x) - standing_w;
     TRY_ASSIGN(auto least, LeastEnergy::make(model, tables, value_of_time_w, stop));
-    TRY_ASSIGN(const auto priced, at_least_energy(plan, least));
+    TRY_ASSIGN(const auto priced, least.price(plan));
     forecast::Outlook outlook = look(priced);
     const bool keeps = outlook.probability >= confidence;
     if (keeps) best = FastestDriving{value_of_time_w, std::move(outlook)};
@@ -696,7 +798,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
 
   std::optional<Pricing> best;
   if (least) {
-    auto priced = at_least_energy(plan, *least);
+    auto priced = least->price(plan);
     if (priced)
       best = std::move(*priced);
     else if (minimum_energy)
