@@ -11,7 +11,7 @@
 #include "answers/drive.h"
 #include "answers/model.h"
 #include "energy/motion_estimate.h"
-#include "planning/peaks.h"
+#include "planning/load.h"
 
 namespace joulecast::answers {
 

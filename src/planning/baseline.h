@@ -6,7 +6,6 @@
 #include "base/error.h"
 #include "planning/load.h"
 #include "planning/path.h"
-#include "planning/peaks.h"
 #include "planning/problem.h"
 
 namespace joulecast::planning {

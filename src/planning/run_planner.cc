@@ -10,7 +10,6 @@
 
 #include "base/try.h"
 #include "planning/numerics.h"
-#include "planning/peaks.h"
 
 namespace joulecast::planning {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <random>
 
-#include "planning/peaks.h"
+#include "planning/load.h"
 #include "planning/planner.h"
 #include "tests/planning/robots.h"
 #include "tests/planning/transcription.h"
