@@ -30,10 +30,9 @@ Result<std::vector<MissionRequest>> stored_mission_requests(const history::Store
   const auto all = nlohmann::json::parse(stored->body_json, nullptr, false);
   if (!all.is_array()) return requests;
   for (const nlohmann::json& each : all) {
-    const nlohmann::json& payload = each.at("payload_kg");
     requests.push_back({{each.at("utime_us").get<std::int64_t>(), each.at("mission_id").get<std::string>(),
                          static_cast<signals::MissionPhase>(each.at("phase").get<int>()),
-                         payload.is_number() ? payload.get<double>() : signals::unmeasured,
+                         number_or_nan(each.at("payload_kg")),
                          each.at("note").get<std::string>()},
                         each.at("request_utime_us").get<std::int64_t>()});
   }

@@ -7,7 +7,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "planning/limited_line.h"
+#include "planning/line.h"
 #include "planning/load.h"
 #include "planning/path.h"
 #include "planning/problem.h"

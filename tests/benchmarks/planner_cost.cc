@@ -16,7 +16,7 @@
 
 #include "planning/baseline.h"
 #include "planning/cost_table.h"
-#include "planning/limited_line.h"
+#include "planning/line.h"
 #include "planning/planner.h"
 #include "tests/benchmarks/rmf_motion.h"
 #include "tests/planning/random_problem.h"

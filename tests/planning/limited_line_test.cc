@@ -1,10 +1,9 @@
-#include "planning/limited_line.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
+#include "planning/line.h"
 #include "planning/planner.h"
 #include "tests/planning/robots.h"
 #include "tests/support/straight_power.h"
