@@ -160,6 +160,22 @@ class Shape {
   double push_, square_, rate_, limit_;
 };
 
+// As many even cells as an extremal needs so that the speed, taken as linear between them, covers its
+// distance but for `distance_told`; at least `count`.
+double enough_cells(const LineProfile& profile, double count) {
+  constexpr double distance_told = 8e-5, most = 20'000;
+  const double ends = 0.5 * (profile.speed(0) + profile.speed(profile.duration_s()));
+  while (count < most) {
+    const double step = profile.duration_s() / count;
+    double sum = ends;
+    for (double i = 1; i < count; ++i) sum += profile.speed(i * step);
+    const double error = std::fabs(sum * step / profile.distance() - 1);
+    if (error <= distance_told) break;
+    count = std::ceil(count * std::clamp(1.02 * std::sqrt(error / distance_told), 1.02, 4.0));
+  }
+  return count;
+}
+
 }  // namespace
 
 LineProfile::LineProfile(const LineTask& task, double duration_s)
@@ -322,26 +338,6 @@ const LineMotion::Piece& LineMotion::at(double& time_s) const {
   time_s = std::clamp(time_s - pieces_[k].start_s, 0.0, pieces_[k].duration_s);
   return pieces_[k];
 }
-
-namespace {
-
-// As many even cells as an extremal needs so that the speed, taken as linear between them, covers its
-// distance but for `distance_told`; at least `count`.
-double enough_cells(const LineProfile& profile, double count) {
-  constexpr double distance_told = 8e-5, most = 20'000;
-  const double ends = 0.5 * (profile.speed(0) + profile.speed(profile.duration_s()));
-  while (count < most) {
-    const double step = profile.duration_s() / count;
-    double sum = ends;
-    for (double i = 1; i < count; ++i) sum += profile.speed(i * step);
-    const double error = std::fabs(sum * step / profile.distance() - 1);
-    if (error <= distance_told) break;
-    count = std::ceil(count * std::clamp(1.02 * std::sqrt(error / distance_told), 1.02, 4.0));
-  }
-  return count;
-}
-
-}  // namespace
 
 std::vector<double> LineMotion::times(std::size_t cells) const {
   std::vector<double> times{0};
