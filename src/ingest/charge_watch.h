@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "battery/charge_tracker.h"
+#include "battery/charge_filter.h"
 #include "battery/charging.h"
 #include "robot/robot_model.h"
 #include "signals/sample.h"

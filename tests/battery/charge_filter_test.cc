@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "battery/calibrate.h"
-#include "battery/charge_tracker.h"
 #include "support.h"
 #include "tests/support/shared_folder.h"
 
