@@ -24,20 +24,15 @@ namespace {
 
 // The lock is the connection's: it ends when the connection's transaction is decided and the connection
 // closed. Others in the same database have another schema; "JLCT" sets the lock apart from other programs'.
-bool try_lock(Database& database) {
-  return database.integer("SELECT pg_try_advisory_lock(1246512980, hashtext(current_schema()))::int") == 1;
+// In shared mode several programs may hold it if all take it in this mode.
+bool try_lock(Database& database, bool shared = false) {
+  return database.integer(std::string("SELECT pg_try_advisory_lock") + (shared ? "_shared" : "") +
+                          "(1246512980, hashtext(current_schema()))::int") == 1;
 }
 
-// The same lock in shared mode: several programs may hold it if all take it in this mode.
-bool try_shared_lock(Database& database) {
-  return database.integer(
-             "SELECT pg_try_advisory_lock_shared(1246512980, hashtext(current_schema()))::int") == 1;
-}
-
-Result<void> wait_for_lock(Database& database, bool (*try_it)(Database&),
-                           std::chrono::milliseconds patience) {
+Result<void> wait_for_lock(Database& database, bool shared, std::chrono::milliseconds patience) {
   const auto give_up = std::chrono::steady_clock::now() + patience;
-  while (!try_it(database)) {
+  while (!try_lock(database, shared)) {
     if (std::chrono::steady_clock::now() >= give_up)
       return fail(Fault::conflict, "database", "is locked: another joulecast program has this store open");
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -56,7 +51,7 @@ Result<std::unique_ptr<PostgresDatabase>> connect_writer(const std::string& url,
 Result<std::unique_ptr<PostgresDatabase>> open_writer(const std::string& url, const StoreOptions& options,
                                                       const std::string& writer_name) {
   TRY_ASSIGN(auto database, connect_writer(url, writer_name));
-  TRY(wait_for_lock(*database, try_lock, options.lock_wait));
+  TRY(wait_for_lock(*database, false, options.lock_wait));
   TRY(bring_to_postgres_schema(*database));
   return database;
 }
@@ -93,9 +88,9 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const std::string& 
     TRY(bring_to_postgres_schema(database));
     prepare_shared(database);
     // The own lock is no obstacle to the shared one.
-    if (!try_shared_lock(database)) return fail(Fault::internal, "database", "the lock was not shared");
+    if (!try_lock(database, true)) return fail(Fault::internal, "database", "the lock was not shared");
     database.execute("SELECT pg_advisory_unlock(1246512980, hashtext(current_schema()))");
-  } else if (auto held = wait_for_lock(database, try_shared_lock, options.lock_wait); !held) {
+  } else if (auto held = wait_for_lock(database, true, options.lock_wait); !held) {
     return tl::unexpected(held.error());
   }
   const std::int64_t version = database.integer("SELECT schema_version FROM joulecast_store");
@@ -254,7 +249,7 @@ class PostgresStore final : public SqlStore {
         database,
         "SELECT count(*) FROM pg_stat_activity WHERE application_name = ? AND pid <> pg_backend_pid()",
         name_);
-    return others.next() && others.integer() == 0 && try_shared_lock(database);
+    return others.next() && others.integer() == 0 && try_lock(database, true);
   }
 
   // Records the batch, by which a later connection sees the outcome of its COMMIT. Locks the row till then.
