@@ -294,27 +294,23 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
                  energy::compare_with_regression(diagnosed, others.missions, robot, corrected)};
 }
 
-const described::Table<GapTest>& test_table() {
-  using R = energy::RegressionComparison;
-  static const auto beside =
-      described::Table<R>()
-          .value("windows", &R::windows, "windows with new readings")
-          .number_or_null("file_missed", AT(missed.file), "mean |error| over mean |power| there")
-          .number_or_null("corrected_missed", AT(missed.corrected), "with the effects found")
-          .number_or_null("regression_missed", AT(missed.regression), "of a linear regression")
-          .number_or_null("lead_sd", AT(missed.lead_sd),
-                          "standard error of corrected_missed - regression_missed")
-          .value("regression_wins", AT(missed.regression_wins()),
-                 "the regression predicts better, by more than lead_sd");
-  static const auto table =
-      described::Table<GapTest>()
-          .include(answers::back_test_table(), &GapTest::replayed)
-          .object(
-              "beside_regression",
-              [](const GapTest& t) { return t.beside_regression ? &*t.beside_regression : nullptr; },
-              "null: not compared", beside);
-  return table;
-}
+const auto regression_table =
+    described::Table<energy::RegressionComparison>()
+        .value("windows", AT(windows), "windows with new readings")
+        .number_or_null("file_missed", AT(missed.file), "mean |error| over mean |power| there")
+        .number_or_null("corrected_missed", AT(missed.corrected), "with the effects found")
+        .number_or_null("regression_missed", AT(missed.regression), "of a linear regression")
+        .number_or_null("lead_sd", AT(missed.lead_sd),
+                        "standard error of corrected_missed - regression_missed")
+        .value("regression_wins", AT(missed.regression_wins()),
+               "the regression predicts better, by more than lead_sd");
+const auto test_table =
+    described::Table<GapTest>()
+        .include(answers::back_test_table(), AT(replayed))
+        .object(
+            "beside_regression",
+            [](const GapTest& t) { return t.beside_regression ? &*t.beside_regression : nullptr; },
+            "null: not compared", regression_table);
 
 void print(const GapTest& test, const Json& told, const std::string& unit) {
   print_back_test(told, unit);
@@ -382,7 +378,7 @@ Result<Exit> gap_of_logs(const GapOptions& options, const robot::RobotModel& rob
   if (!options.compare_by.empty()) return gap_between_groups(recordings, robot, options, origin);
   TRY_ASSIGN(const auto judged, judge_recordings(options, recordings, robot));
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged.diagnosis);
-  const auto test = judged.test ? test_table().document(*judged.test) : nlohmann::ordered_json();
+  const auto test = judged.test ? test_table.document(*judged.test) : nlohmann::ordered_json();
   if (options.json && judged.test) document["back_test"] = test;
   show_diagnosis(options, document);
   if (!options.json && judged.test) print(*judged.test, test, options.unit);

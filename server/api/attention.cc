@@ -199,37 +199,33 @@ std::vector<AttentionReason> reasons_from(const std::string& body_json) {
   return reasons;
 }
 
-const Table<AttentionEntry>& attention_entry_table() {
-  using E = AttentionEntry;
-  static const auto acknowledgement =
-      Table<Acknowledgement>()
-          .time("", &Acknowledgement::utime_us, "time of the acknowledgement, microseconds since 1970")
-          .text_or_null("by", &Acknowledgement::by, "name of the token; null: anonymous")
-          .value("note", &Acknowledgement::note, "note of the person");
-  static const auto reason =
-      Table<AttentionReason>()
-          .word("kind", &AttentionReason::kind, attention_kinds(), "the condition")
-          .word("severity", &AttentionReason::severity, severity_names, "as above")
-          .time("since", &AttentionReason::since_utime_us,
-                "start of the condition, microseconds since 1970; null: not available")
-          .value("message", &AttentionReason::message, "the condition in one sentence, with its number")
-          .value("action", &AttentionReason::action, "the required action, in one sentence")
-          .object("acknowledged", &AttentionReason::acknowledged,
-                  "acknowledgement, valid until the condition ends; null: not acknowledged", acknowledgement);
-  static const auto table =
-      Table<E>("A robot that needs attention")
-          .named("attention-entry")
-          .text_or_null("robot_id", &E::robot_id, "the robot; null: the service itself")
-          .word(
-              "severity", AT(reasons.front().severity), severity_names,
+const auto acknowledgement_table =
+    Table<Acknowledgement>()
+        .time("", AT(utime_us), "time of the acknowledgement, microseconds since 1970")
+        .text_or_null("by", AT(by), "name of the token; null: anonymous")
+        .value("note", AT(note), "note of the person");
+const auto reason_table =
+    Table<AttentionReason>()
+        .word("kind", AT(kind), attention_kinds(), "the condition")
+        .word("severity", AT(severity), severity_names, "as above")
+        .time("since", AT(since_utime_us),
+              "start of the condition, microseconds since 1970; null: not available")
+        .value("message", AT(message), "the condition in one sentence, with its number")
+        .value("action", AT(action), "the required action, in one sentence")
+        .object("acknowledged", AT(acknowledged),
+                "acknowledgement, valid until the condition ends; null: not acknowledged",
+                acknowledgement_table);
+const auto attention_entry_table =
+    Table<AttentionEntry>("A robot that needs attention")
+        .named("attention-entry")
+        .text_or_null("robot_id", AT(robot_id), "the robot; null: the service itself")
+        .word("severity", AT(reasons.front().severity), severity_names,
               "severity of its first reason. fault: data are wrong or missing; warning: a robot or its model "
               "needs a person; notice: for information")
-          .value("acknowledged", AT(reasons.front().acknowledged.has_value()),
-                 "whether all its reasons are acknowledged")
-          .list("reasons", &E::reasons, "the unacknowledged ones first, then the most urgent", reason,
-                {{"minItems", 1}});
-  return table;
-}
+        .value("acknowledged", AT(reasons.front().acknowledged.has_value()),
+               "whether all its reasons are acknowledged")
+        .list("reasons", AT(reasons), "the unacknowledged ones first, then the most urgent", reason_table,
+              {{"minItems", 1}});
 
 struct Attention {
   std::vector<AttentionEntry> entries;
@@ -241,55 +237,49 @@ struct Attention {
   }
 };
 
-const Table<Attention>& attention_table() {
-  static const auto counts = [] {
-    Table<Attention> each;
-    for (std::size_t k = 0; k < std::size(severity_names); ++k) {
-      const std::string name(severity_names[k]);
-      each.value(name, [k](const Attention& a) { return a.count(k); },
-                 "entries of severity " + name + " with an unacknowledged reason", {{"minimum", 0}});
-    }
-    return each;
-  }();
-  static const auto table =
-      Table<Attention>("Robots that need attention")
-          .list("attention", &Attention::entries,
-                "one entry for each robot with a reason: those with an unacknowledged reason first, then the "
-                "most urgent, then by robot id",
-                attention_entry_table())
-          .object("counts", std::identity(), "unacknowledged entries by severity", counts);
-  return table;
-}
+const auto counts_table = [] {
+  Table<Attention> each;
+  for (std::size_t k = 0; k < std::size(severity_names); ++k) {
+    const std::string name(severity_names[k]);
+    each.value(name, [k](const Attention& a) { return a.count(k); },
+               "entries of severity " + name + " with an unacknowledged reason", {{"minimum", 0}});
+  }
+  return each;
+}();
+const auto attention_table =
+    Table<Attention>("Robots that need attention")
+        .list("attention", AT(entries),
+              "one entry for each robot with a reason: those with an unacknowledged reason first, then the "
+              "most urgent, then by robot id",
+              attention_entry_table)
+        .object("counts", std::identity(), "unacknowledged entries by severity", counts_table);
 
 struct AcknowledgeRequest {
   std::size_t kind = 0;  // of kinds
   std::string note;
 };
 
-const described::Input<AcknowledgeRequest>& acknowledge_input() {
-  using A = AcknowledgeRequest;
-  static const auto input =
-      described::Input<A>("Acknowledgement of a robot's reasons for attention")
-          .choice("kind", &A::kind, attention_kinds(), "kind of the reasons, as GET /v1/attention lists it")
-          .text("note", &A::note, most_note, "what is being done about it; may be empty");
-  return input;
-}
+const auto acknowledge_input =
+    described::Input<AcknowledgeRequest>("Acknowledgement of a robot's reasons for attention")
+        .choice("kind", &AcknowledgeRequest::kind, attention_kinds(),
+                "kind of the reasons, as GET /v1/attention lists it")
+        .text("note", &AcknowledgeRequest::note, most_note, "what is being done about it; may be empty");
 
 Result<Response> get_attention(const Services& services, const Request&) {
-  return http::json_response(attention_table().text({services.attention->entries()}));
+  return http::json_response(attention_table.text({services.attention->entries()}));
 }
 
 Result<Response> acknowledge(const Services& services, const Request& request) {
   const std::string& robot_id = request.param("id");
   if (services.models.find(robot_id) == nullptr && services.fleet.find(robot_id) == nullptr)
     return tl::unexpected(ingest::unknown_robot("id", robot_id));
-  TRY_ASSIGN(const auto wanted, acknowledge_input().read(*request.json));
+  TRY_ASSIGN(const auto wanted, acknowledge_input.read(*request.json));
   RequestChange request_change(services, request);
   const history::Outcome done = services.attention->acknowledge(
       robot_id, std::string(kinds[wanted.kind].name), {services.now_utime_us(), request.actor, wanted.note},
       [&](const AttentionEntry& entry, history::Learned learned) {
         return services.writer.execute(request_change.answered_by(
-            [entry](std::int64_t) { return http::json_response(attention_entry_table().text(entry)); },
+            [entry](std::int64_t) { return http::json_response(attention_entry_table.text(entry)); },
             history::PutLearned{std::move(learned)}));
       });
   return request_change.result(done);
@@ -475,9 +465,9 @@ Part attention_part() {
            "attention-entry", acknowledge,
            {.request_schema = "acknowledge-request", .error_statuses = {404, 422}, .run = Run::write});
   return {std::move(rows),
-          {{"acknowledge-request", acknowledge_input().schema()},
-           {"attention", attention_table().schema()},
-           {"attention-entry", attention_entry_table().schema()}}};
+          {{"acknowledge-request", acknowledge_input.schema()},
+           {"attention", attention_table.schema()},
+           {"attention-entry", attention_entry_table.schema()}}};
 }
 
 }  // namespace joulecast::api

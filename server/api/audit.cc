@@ -8,27 +8,23 @@ namespace {
 
 constexpr std::string_view usual_request_order = "desc";
 
-const Table<history::AuditEntry>& entry_table() {
-  using E = history::AuditEntry;
-  static const auto table =
-      Table<E>()
-          .value("id", &E::id, "1, 2, 3 ..., without a gap")
-          .time("", &E::utime_us, "time of storage, microseconds since 1970 by the host's clock")
-          .text_or_null("actor", &E::actor, "name of the token; null: no authenticated client")
-          .text_or_null("address", &E::address, "IP address of the client; null: the daemon itself")
-          .text_or_null("request_id", &E::request_id,
-                        "X-Request-Id of the request and its answer; null: no request")
-          .value("action", &E::action, "operationId of the request, or another event such as token_added")
-          .json("detail", &E::detail_json, "parameters of the request, or the status of the response",
-                described::of_type("object"))
-          .value("hash", &E::hash, "SHA-256 over the hash of the entry before and this entry");
-  return table;
-}
+const auto entry_table =
+    Table<history::AuditEntry>()
+        .value("id", AT(id), "1, 2, 3 ..., without a gap")
+        .time("", AT(utime_us), "time of storage, microseconds since 1970 by the host's clock")
+        .text_or_null("actor", AT(actor), "name of the token; null: no authenticated client")
+        .text_or_null("address", AT(address), "IP address of the client; null: the daemon itself")
+        .text_or_null("request_id", AT(request_id),
+                      "X-Request-Id of the request and its answer; null: no request")
+        .value("action", AT(action), "operationId of the request, or another event such as token_added")
+        .json("detail", AT(detail_json), "parameters of the request, or the status of the response",
+              described::of_type("object"))
+        .value("hash", AT(hash), "SHA-256 over the hash of the entry before and this entry");
 
 Result<Response> audit(const Services& services, const Request& request) {
   TRY_ASSIGN(const LogQuery query, log_query(request, usual_request_order));
   TRY_ASSIGN(const auto found, services.store.audit(query.behind_id, query.limit, query.filter));
-  return page_response("entries", found, entry_table(),
+  return page_response("entries", found, entry_table,
                        next_id_cursor(found, query.limit, &history::AuditEntry::id));
 }
 
@@ -43,7 +39,7 @@ Part audit_part() {
            {.parameters = log_parameters("only entries of this action", usual_request_order)});
   return {std::move(rows),
           {{"audit", described::of_page("Entries of the audit", "entries", "in the requested order",
-                                        entry_table().of_member())}}};
+                                        entry_table.of_member())}}};
 }
 
 }  // namespace joulecast::api

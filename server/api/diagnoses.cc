@@ -32,69 +32,57 @@ double done_share(const DiagnosisAnswer& a) {
 }
 
 // Without the result.
-const Table<DiagnosisAnswer>& job_table() {
-  using A = DiagnosisAnswer;
-  static const auto table =
-      Table<A>()
-          .value("id", AT(record.id), "number of the diagnosis, as in /v1/diagnoses/{id}")
-          .value("robot_id", AT(record.robot_id), "the robot that is diagnosed")
-          .word("state", state_of, history::names_of<history::DiagnosisState>,
-                "interrupted: the service stopped while it ran")
-          .word("cause", AT(record.cause), history::names_of<history::DiagnosisCause>,
-                "request: started by a client; watch: started after a detected drift")
-          .value("progress", done_share, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
-          .value(
-              "ahead", [](const A& a) { return a.progress ? a.progress->ahead : a.ahead; },
-              "jobs before it in the queue")
-          .time("created", AT(record.created_utime_us),
-                "time of creation, microseconds since 1970 by the host's clock")
-          .time(
-              "started",
-              [](const A& a) {
-                return a.progress ? a.progress->started_utime_us : a.record.started_utime_us;
-              },
-              "start of its execution; null: not started")
-          .time("finished", AT(record.finished_utime_us), "its end; null: not ended")
-          .value("model_version", AT(record.model_version), "the model that was diagnosed")
-          .integers("fitted_on", AT(record.fitted_on), "diagnosed missions")
-          .integers("held_back", AT(record.held_back), "missions held back for a back-test")
-          .text_or_null("error", AT(record.error), "reason of its failure; null: not failed")
-          .json("request", AT(record.request_json), "the request that started it",
-                described::of_type("object"));
-  return table;
-}
+const auto job_table =
+    Table<DiagnosisAnswer>()
+        .value("id", AT(record.id), "number of the diagnosis, as in /v1/diagnoses/{id}")
+        .value("robot_id", AT(record.robot_id), "the robot that is diagnosed")
+        .word("state", state_of, history::names_of<history::DiagnosisState>,
+              "interrupted: the service stopped while it ran")
+        .word("cause", AT(record.cause), history::names_of<history::DiagnosisCause>,
+              "request: started by a client; watch: started after a detected drift")
+        .value("progress", done_share, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
+        .value(
+            "ahead", [](const DiagnosisAnswer& a) { return a.progress ? a.progress->ahead : a.ahead; },
+            "jobs before it in the queue")
+        .time("created", AT(record.created_utime_us),
+              "time of creation, microseconds since 1970 by the host's clock")
+        .time(
+            "started",
+            [](const DiagnosisAnswer& a) {
+              return a.progress ? a.progress->started_utime_us : a.record.started_utime_us;
+            },
+            "start of its execution; null: not started")
+        .time("finished", AT(record.finished_utime_us), "its end; null: not ended")
+        .value("model_version", AT(record.model_version), "the model that was diagnosed")
+        .integers("fitted_on", AT(record.fitted_on), "diagnosed missions")
+        .integers("held_back", AT(record.held_back), "missions held back for a back-test")
+        .text_or_null("error", AT(record.error), "reason of its failure; null: not failed")
+        .json("request", AT(record.request_json), "the request that started it",
+              described::of_type("object"));
 
-const Table<DiagnosisAnswer>& listed_diagnosis_table() {
-  using A = DiagnosisAnswer;
-  static const auto table =
-      Table<A>("A diagnosis of a list, or that has ended")
-          .named("listed-diagnosis")
-          .include(job_table(), std::identity())
-          .json("summary", AT(record.summary_json), "verdict, gap, effects and shrinkage of the result",
-                described::of_type("object", true));
-  return table;
-}
-
-const Table<DiagnosisAnswer>& diagnosis_table() {
-  using A = DiagnosisAnswer;
-  static const auto table =
-      Table<A>("A diagnosis of the gap between a robot and its model")
-          .include(job_table(), std::identity())
-          .json("result", AT(record.result_json),
-                "output of `joulecast gap --json`; results of earlier versions lack members that were added "
-                "later",
-                described::or_null(described::of_reference("gap"), true))
-          .compact_json(
-              "model", AT(record.model_json),
-              "robot file with the estimated effects applied; null: no effect was found, or one of several "
-              "effects must be selected first",
+const auto listed_diagnosis_table =
+    Table<DiagnosisAnswer>("A diagnosis of a list, or that has ended")
+        .named("listed-diagnosis")
+        .include(job_table, std::identity())
+        .json("summary", AT(record.summary_json), "verdict, gap, effects and shrinkage of the result",
               described::of_type("object", true));
-  return table;
-}
+
+const auto diagnosis_table =
+    Table<DiagnosisAnswer>("A diagnosis of the gap between a robot and its model")
+        .include(job_table, std::identity())
+        .json("result", AT(record.result_json),
+              "output of `joulecast gap --json`; results of earlier versions lack members that were added "
+              "later",
+              described::or_null(described::of_reference("gap"), true))
+        .compact_json(
+            "model", AT(record.model_json),
+            "robot file with the estimated effects applied; null: no effect was found, or one of several "
+            "effects must be selected first",
+            described::of_type("object", true));
 
 Response answer_diagnosis(const Services& services, const DiagnosisRecord& diagnosis, std::size_t ahead = 0) {
   return http::json_response(
-      diagnosis_table().text({diagnosis, services.diagnoses.progress(diagnosis.id), ahead}));
+      diagnosis_table.text({diagnosis, services.diagnoses.progress(diagnosis.id), ahead}));
 }
 
 Result<Response> start(Services& services, const Request& request) {
@@ -138,7 +126,7 @@ Result<Response> list_diagnoses(const Services& services, const Request& request
              services.store.diagnoses(robot, cursor.value_or(history::whole_future), limit));
   const std::string next = next_id_cursor(found, limit, &DiagnosisRecord::id);
   const auto write = [&](JsonWriter& out, const DiagnosisRecord& d) {
-    listed_diagnosis_table().write(out, {d, services.diagnoses.progress(d.id)});
+    listed_diagnosis_table.write(out, {d, services.diagnoses.progress(d.id)});
   };
   if (request.csv)
     return csv_response(request, "diagnoses",
@@ -161,19 +149,12 @@ Result<Response> report(const Services& services, const Request& request) {
   return response;
 }
 
-const Table<server::DiagnosisProgress>& progress_table() {
-  using P = server::DiagnosisProgress;
-  using history::DiagnosisState;
-  static const std::array states{history::name(DiagnosisState::queued),
-                                 history::name(DiagnosisState::running)};
-  static const auto table =
-      Table<P>("Progress of a diagnosis")
-          .value("id", &P::id, "number of the diagnosis")
-          .word("state", &P::state, states, "queued or running")
-          .value("progress", &P::fraction, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
-          .value("ahead", &P::ahead, "diagnoses that run before it", {{"minimum", 0}});
-  return table;
-}
+const auto progress_table =
+    Table<server::DiagnosisProgress>("Progress of a diagnosis")
+        .value("id", AT(id), "number of the diagnosis")
+        .word("state", AT(state), std::array{"queued", "running"}, "queued or running")
+        .value("progress", AT(fraction), "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
+        .value("ahead", AT(ahead), "diagnoses that run before it", {{"minimum", 0}});
 
 // The progress of one job as events "progress", and its end as one event "ended" with the response of
 // GET /v1/diagnoses/{id}, after which the stream ends.
@@ -184,7 +165,7 @@ class ProgressStream final : public http::StreamSource {
   Next pull(std::string& out) override {
     const auto now = std::chrono::steady_clock::now();
     if (const auto progress = services_.diagnoses.progress(id_)) {
-      std::string text = progress_table().text(*progress);
+      std::string text = progress_table.text(*progress);
       if (text != last_) {
         last_ = std::move(text);
         out += "event: progress\ndata: " + last_ + "\n\n";
@@ -198,7 +179,7 @@ class ProgressStream final : public http::StreamSource {
     const Result<history::DiagnosisRecord> stored = services_.store.diagnosis(id_);
     if (!stored) return Next::abort;
     out +=
-        "event: ended\ndata: " + listed_diagnosis_table().text({*stored, services_.diagnoses.progress(id_)}) +
+        "event: ended\ndata: " + listed_diagnosis_table.text({*stored, services_.diagnoses.progress(id_)}) +
         "\n\n";
     return Next::end;
   }
@@ -256,12 +237,12 @@ Part diagnosis_part() {
            "The report of a diagnosis as one self-contained page", "", report,
            {.response_type = "text/html", .error_statuses = {404}, .run = Run::compute});
   return {std::move(rows),
-          {{"diagnosis", diagnosis_table().schema()},
-           {"diagnosis-progress", progress_table().schema()},
-           {"listed-diagnosis", listed_diagnosis_table().schema()},
+          {{"diagnosis", diagnosis_table.schema()},
+           {"diagnosis-progress", progress_table.schema()},
+           {"listed-diagnosis", listed_diagnosis_table.schema()},
            {"diagnosis-list",
             described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",
-                               listed_diagnosis_table().of_member())}}};
+                               listed_diagnosis_table.of_member())}}};
 }
 
 }  // namespace joulecast::api

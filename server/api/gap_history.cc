@@ -42,65 +42,52 @@ std::optional<bool> was_forced(const history::ModelVersion& version) {
   return evidence.is_object() ? std::optional(evidence.value("forced", false)) : std::nullopt;
 }
 
-const Table<history::ModelVersion>& version_table() {
-  using V = history::ModelVersion;
-  static const auto table =
-      Table<V>()
-          .value("model_version", &V::version, version_words)
-          .time("created", &V::created_utime_us,
-                "time of creation, microseconds since 1970 by the host's clock")
-          .value(
-              "origin", [](const V& version) { return history::name(version.origin); },
-              "where the model came from")
-          .value("note", &V::note, "note of its author")
-          .value("active", &V::active, "whether it is in force")
-          .value(
-              "error_before", [](const V& version) { return error_of(version, "error_before"); },
-              "of the back-test with which it was adopted: error of the version before; null: none")
-          .value(
-              "error_after", [](const V& version) { return error_of(version, "error_after"); },
-              "the same with this version")
-          .value("forced", was_forced,
-                 "true: adopted although the back-test showed no improvement; null: adopted without a "
-                 "back-test");
-  return table;
-}
+const auto adopted_version_table =
+    Table<history::ModelVersion>()
+        .value("model_version", AT(version), version_words)
+        .time("created", AT(created_utime_us),
+              "time of creation, microseconds since 1970 by the host's clock")
+        .value(
+            "origin", [](const auto& version) { return history::name(version.origin); },
+            "where the model came from")
+        .value("note", AT(note), "note of its author")
+        .value("active", AT(active), "whether it is in force")
+        .value(
+            "error_before", [](const auto& version) { return error_of(version, "error_before"); },
+            "of the back-test with which it was adopted: error of the version before; null: none")
+        .value(
+            "error_after", [](const auto& version) { return error_of(version, "error_after"); },
+            "the same with this version")
+        .value("forced", was_forced,
+               "true: adopted although the back-test showed no improvement; null: adopted without a "
+               "back-test");
 
-const Table<drift::MissionRatio>& ratio_table() {
-  static const auto table = Table<drift::MissionRatio>()
-                                .value("id", &drift::MissionRatio::mission_key, "as in /v1/missions/{id}")
-                                .time("start", &drift::MissionRatio::utime_us, start_words)
-                                .value("model_version", &drift::MissionRatio::model_version, version_words)
-                                .value("measured_j", &drift::MissionRatio::measured_j,
-                                       "energy from the battery by the sensors of voltage and current")
-                                .value("modelled_j", &drift::MissionRatio::modelled_j, "where measured")
-                                .value("ratio", &drift::MissionRatio::ratio, "measured / modelled");
-  return table;
-}
+const auto ratio_table =
+    Table<drift::MissionRatio>()
+        .value("id", AT(mission_key), "as in /v1/missions/{id}")
+        .time("start", AT(utime_us), start_words)
+        .value("model_version", AT(model_version), version_words)
+        .value("measured_j", AT(measured_j), "energy from the battery by the sensors of voltage and current")
+        .value("modelled_j", AT(modelled_j), "where measured")
+        .value("ratio", AT(ratio), "measured / modelled");
 
-const Table<GapHistory>& gap_history_table() {
-  using G = GapHistory;
-  static const auto sibling =
-      Table<drift::SiblingRatio>()
-          .value("robot_id", &drift::SiblingRatio::robot_id, robot_words)
-          .value("missions", &drift::SiblingRatio::missions, "number of missions")
-          .value("ratio", &drift::SiblingRatio::ratio, "median of measured over modelled energy")
-          .numbers("ci", &drift::SiblingRatio::interval, "95 % interval")
-          .value("deviation", &drift::SiblingRatio::deviation,
-                 "robust standard deviations from the kind's median")
-          .value("stands_out", &drift::SiblingRatio::stands_out,
-                 "whether it differs significantly from the others");
-  static const auto table =
-      Table<G>("A robot's gap by mission")
-          .value("robot_id", &G::robot_id, robot_words)
-          .value("model_version", &G::model_version, "version in force")
-          .list("missions", &G::missions, "measured over modelled energy of each mission, oldest first",
-                ratio_table())
-          .list("drift", &G::marks, "detected changes of the robot", answers::mark_table())
-          .list("versions", &G::versions, "versions of the model, newest first", version_table())
-          .list("siblings", &G::siblings, "robots of this kind, this one among them", sibling);
-  return table;
-}
+const auto sibling_table =
+    Table<drift::SiblingRatio>()
+        .value("robot_id", AT(robot_id), robot_words)
+        .value("missions", AT(missions), "number of missions")
+        .value("ratio", AT(ratio), "median of measured over modelled energy")
+        .numbers("ci", AT(interval), "95 % interval")
+        .value("deviation", AT(deviation), "robust standard deviations from the kind's median")
+        .value("stands_out", AT(stands_out), "whether it differs significantly from the others");
+const auto gap_history_table =
+    Table<GapHistory>("A robot's gap by mission")
+        .value("robot_id", AT(robot_id), robot_words)
+        .value("model_version", AT(model_version), "version in force")
+        .list("missions", AT(missions), "measured over modelled energy of each mission, oldest first",
+              ratio_table)
+        .list("drift", AT(marks), "detected changes of the robot", answers::mark_table())
+        .list("versions", AT(versions), "versions of the model, newest first", adopted_version_table)
+        .list("siblings", AT(siblings), "robots of this kind, this one among them", sibling_table);
 
 Result<Response> gap_history(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
@@ -111,26 +98,21 @@ Result<Response> gap_history(const Services& services, const Request& request) {
     return csv_response(
         request, "robot-" + id + "-gap-history",
         {"id", "start", "start_utime_us", "model_version", "measured_j", "modelled_j", "ratio"}, missions,
-        ratio_table());
+        ratio_table);
   TRY_ASSIGN(auto marks, services.drift.marks(id));
   TRY_ASSIGN(auto siblings, services.drift.siblings(id));
   TRY_ASSIGN(auto versions, services.store.model_versions(id));
-  return http::json_response(gap_history_table().text(
+  return http::json_response(gap_history_table.text(
       {id, model->version, std::move(missions), std::move(marks), std::move(versions), std::move(siblings)}));
 }
 
-const Table<history::Event>& event_table() {
-  using E = history::Event;
-  static const auto table =
-      Table<E>()
-          .value("id", &E::id, "number of the entry, ascending")
-          .time("", &E::utime_us, "time of the event, microseconds since 1970 by the host's clock")
-          .text_or_null("robot_id", &E::robot_id, "robot of the event; null: none")
-          .value("kind", &E::kind, "kind of event, e.g. gap_drift or model_adopted")
-          .json("detail", &E::detail_json, "details; the members depend on kind",
-                described::of_type("object"));
-  return table;
-}
+const auto event_table =
+    Table<history::Event>()
+        .value("id", AT(id), "number of the entry, ascending")
+        .time("", AT(utime_us), "time of the event, microseconds since 1970 by the host's clock")
+        .text_or_null("robot_id", AT(robot_id), "robot of the event; null: none")
+        .value("kind", AT(kind), "kind of event, e.g. gap_drift or model_adopted")
+        .json("detail", AT(detail_json), "details; the members depend on kind", described::of_type("object"));
 
 // The event log: adoptions, drifts, diagnoses, mission ids that were used again.
 Result<Response> list_events(const Services& services, const Request& request) {
@@ -139,8 +121,8 @@ Result<Response> list_events(const Services& services, const Request& request) {
   const std::string next = next_id_cursor(found, query.limit, &history::Event::id);
   if (request.csv)
     return csv_response(request, "event-log", {"id", "time", "utime_us", "robot_id", "kind", "detail"}, found,
-                        event_table(), next);
-  return page_response("events", found, event_table(), next);
+                        event_table, next);
+  return page_response("events", found, event_table, next);
 }
 
 }  // namespace
@@ -155,7 +137,7 @@ Part gap_history_part() {
             .csv = true,
             .rounded = true,
             .error_statuses = {404}});
-  return {std::move(rows), {{"gap-history", gap_history_table().schema()}}};
+  return {std::move(rows), {{"gap-history", gap_history_table.schema()}}};
 }
 
 Part event_log_part() {
@@ -171,7 +153,7 @@ Part event_log_part() {
        .csv = true});
   return {std::move(rows),
           {{"event-log", described::of_page("Entries of the event log", "events", "in the requested order",
-                                            event_table().of_member())}}};
+                                            event_table.of_member())}}};
 }
 
 }  // namespace joulecast::api

@@ -39,47 +39,36 @@ struct Maps {
   std::vector<RobotPlace> robots;
 };
 
-const Table<Place>& place_table() {
-  static const auto table =
-      Table<Place>("The map and level on which a robot drives", "")
-          .text_or_null("map", &Place::map, "name of the map, 1 to 47 of A-Z a-z 0-9 . _ -; null: none")
-          .text_or_null("level", &Place::level, "name of the level on the map, of the same; null: none");
-  return table;
-}
+const auto place_table =
+    Table<Place>("The map and level on which a robot drives", "")
+        .text_or_null("map", AT(map), "name of the map, 1 to 47 of A-Z a-z 0-9 . _ -; null: none")
+        .text_or_null("level", AT(level), "name of the level on the map, of the same; null: none");
 
-const Table<FloorPlan>& plan_table() {
-  static const auto charger = Table<std::array<double, 2>>()
-                                  .value("x_m", AT(at(0)), "place in the map")
-                                  .value("y_m", AT(at(1)), "place in the map");
-  static const auto table =
-      Table<FloorPlan>("Plan of one level of a map")
-          .value("map", &FloorPlan::map, "name of the map")
-          .value("level", &FloorPlan::level, "name of the level")
-          .time("changed", &FloorPlan::utime_us, "time of the upload")
-          .value("media_type", &FloorPlan::media_type, "of the image",
-                 {{"enum", {"image/png", "image/svg+xml"}}})
-          .value("resolution_m", &FloorPlan::resolution_m, "side of a pixel of the image, m")
-          .value("origin_x_m", &FloorPlan::origin_x_m, "place of the image's lower left corner in the map")
-          .value("origin_y_m", &FloorPlan::origin_y_m, "place of the image's lower left corner in the map")
-          .value("origin_yaw_rad", &FloorPlan::origin_yaw_rad,
-                 "rotation of the image about that corner, counterclockwise")
-          .list("chargers", &FloorPlan::chargers, "places of chargers", charger);
-  return table;
-}
+const auto charger_table = Table<std::array<double, 2>>()
+                               .value("x_m", AT(at(0)), "place in the map")
+                               .value("y_m", AT(at(1)), "place in the map");
+const auto plan_table =
+    Table<FloorPlan>("Plan of one level of a map")
+        .value("map", AT(map), "name of the map")
+        .value("level", AT(level), "name of the level")
+        .time("changed", AT(utime_us), "time of the upload")
+        .value("media_type", AT(media_type), "of the image", {{"enum", {"image/png", "image/svg+xml"}}})
+        .value("resolution_m", AT(resolution_m), "side of a pixel of the image, m")
+        .value("origin_x_m", AT(origin_x_m), "place of the image's lower left corner in the map")
+        .value("origin_y_m", AT(origin_y_m), "place of the image's lower left corner in the map")
+        .value("origin_yaw_rad", AT(origin_yaw_rad),
+               "rotation of the image about that corner, counterclockwise")
+        .list("chargers", AT(chargers), "places of chargers", charger_table);
 
-const Table<Maps>& maps_table() {
-  static const auto robot_place =
-      Table<RobotPlace>()
-          .value("robot_id", &RobotPlace::robot_id, "the robot's id, as in its telemetry")
-          .include(place_table(), &RobotPlace::place)
-          .value("reported", &RobotPlace::reported,
-                 "true: by the robot's covariates map=NAME and level=NAME, which override its settings");
-  static const auto table =
-      Table<Maps>("Floor plans, and the map and level of every robot")
-          .list("levels", &Maps::levels, "levels with a plan, by map and level", plan_table())
-          .list("robots", &Maps::robots, "all robots, by id", robot_place);
-  return table;
-}
+const auto robot_place_table =
+    Table<RobotPlace>()
+        .value("robot_id", AT(robot_id), "the robot's id, as in its telemetry")
+        .include(place_table, AT(place))
+        .value("reported", AT(reported),
+               "true: by the robot's covariates map=NAME and level=NAME, which override its settings");
+const auto maps_table = Table<Maps>("Floor plans, and the map and level of every robot")
+                            .list("levels", AT(levels), "levels with a plan, by map and level", plan_table)
+                            .list("robots", AT(robots), "all robots, by id", robot_place_table);
 
 // The settings of the robots that have some.
 Result<std::map<std::string, Place>> places_of(const history::Store& store) {
@@ -113,7 +102,7 @@ Result<Response> list_maps(const Services& services, const Request&) {
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
   TRY_ASSIGN(auto settings, places_of(services.store));
   for (const std::string& id : ids) maps.robots.push_back(place_of(services, id, settings[id]));
-  return http::json_response(maps_table().text(maps));
+  return http::json_response(maps_table.text(maps));
 }
 
 Result<Response> put_place(Services& services, const Request& request) {
@@ -129,7 +118,7 @@ Result<Response> put_place(Services& services, const Request& request) {
   const nlohmann::json body{{"map", place.map}, {"level", place.level}};
   return RequestChange(services, request)
       .execute(history::PutLearned{{id, place_topic, services.now_utime_us(), body.dump()}},
-               place_table().text(place));
+               place_table.text(place));
 }
 
 Result<FloorPlan> named(const Request& request) {
@@ -170,14 +159,14 @@ Result<Response> put_plan(Services& services, const Request& request) {
   plan.media_type = request.header("content-type");
   if (!is_of_type(request.body, plan.media_type))
     return invalid("Content-Type", "must be image/png or image/svg+xml, and the body such an image");
-  std::string text = plan_table().text(plan);
+  std::string text = plan_table.text(plan);
   plan.image = request.body;
   return RequestChange(services, request).execute(history::PutFloorPlan{std::move(plan)}, std::move(text));
 }
 
 Result<Response> remove_plan(Services& services, const Request& request) {
   TRY_ASSIGN(FloorPlan plan, named(request));
-  std::string text = place_table().text({plan.map, plan.level});
+  std::string text = place_table.text({plan.map, plan.level});
   return RequestChange(services, request).execute(history::PutFloorPlan{std::move(plan)}, std::move(text));
 }
 
@@ -234,9 +223,9 @@ Part map_part() {
       "robot-place", put_place,
       {.request_schema = "robot-place", .error_statuses = {404, 422}, .run = Run::write});
   return {std::move(rows),
-          {{"floor-plan", plan_table().schema()},
-           {"maps", maps_table().schema()},
-           {"robot-place", place_table().schema()}}};
+          {{"floor-plan", plan_table.schema()},
+           {"maps", maps_table.schema()},
+           {"robot-place", place_table.schema()}}};
 }
 
 }  // namespace joulecast::api

@@ -173,51 +173,41 @@ Result<std::vector<Group>> groups_of(const Services& services, const Request& re
   return groups;
 }
 
-const Table<history::Totals>& totals_table() {
-  using T = history::Totals;
-  static const auto table =
-      Table<T>()
-          .value("missions", &T::missions, "selected missions, without annulled ones")
-          .value("measured_missions", &T::measured_missions, "of these, missions with measured energy")
-          .value("incomplete_missions", &T::incomplete_missions, "of these, missions with unmeasured parts")
-          .value("samples", &T::samples, "samples of these missions")
-          .value("gap_count", &T::gap_count, "gaps in the telemetry")
-          .value("gap_s", &T::gap_s, "time without telemetry")
-          .number_or_null(
-              "ratio", [](const T& t) { return signals::energy_ratio(t.accounts); },
-              "measured over modelled energy during measurement; null: not measured")
-          .number_or_null(
-              "wh_per_km", [](const T& t) { return signals::energy_per_distance_wh_km(t.accounts); },
-              "battery energy over distance; null below 0.1 m")
-          .object("energy", &T::accounts, {}, answers::accounts_table(), true)
-          .object("ledger", &T::accounts, "energy by term", answers::ledger_table(), true);
-  return table;
-}
+const auto totals_table =
+    Table<history::Totals>()
+        .value("missions", AT(missions), "selected missions, without annulled ones")
+        .value("measured_missions", AT(measured_missions), "of these, missions with measured energy")
+        .value("incomplete_missions", AT(incomplete_missions), "of these, missions with unmeasured parts")
+        .value("samples", AT(samples), "samples of these missions")
+        .value("gap_count", AT(gap_count), "gaps in the telemetry")
+        .value("gap_s", AT(gap_s), "time without telemetry")
+        .number_or_null(
+            "ratio", [](const auto& t) { return signals::energy_ratio(t.accounts); },
+            "measured over modelled energy during measurement; null: not measured")
+        .number_or_null(
+            "wh_per_km", [](const auto& t) { return signals::energy_per_distance_wh_km(t.accounts); },
+            "battery energy over distance; null below 0.1 m")
+        .object("energy", AT(accounts), {}, answers::accounts_table(), true)
+        .object("ledger", AT(accounts), "energy by term", answers::ledger_table(), true);
 
 struct TotalsAnswer {
   history::Totals all;
   std::optional<std::vector<Group>> groups;
 };
 
-const Table<Group>& group_table() {
-  constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
-  static const auto table =
-      Table<Group>()
-          .texts("robots", &Group::robot_ids, "robots of the group, if grouped by robot or kind; else empty")
-          .time("from", &Group::from_utime_us, time_words)
-          .time("to", &Group::to_utime_us, time_words)
-          .include(totals_table(), &Group::totals, "as above, of this group");
-  return table;
-}
+constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
+const auto group_table =
+    Table<Group>()
+        .texts("robots", AT(robot_ids), "robots of the group, if grouped by robot or kind; else empty")
+        .time("from", AT(from_utime_us), time_words)
+        .time("to", AT(to_utime_us), time_words)
+        .include(totals_table, AT(totals), "as above, of this group");
 
-const Table<TotalsAnswer>& totals_answer_table() {
-  static const auto table =
-      Table<TotalsAnswer>("Sums over missions; null where no mission measured")
-          .include(totals_table(), &TotalsAnswer::all)
-          .list("groups", &TotalsAnswer::groups,
-                "the sums of each group that has missions; null without group_by", group_table());
-  return table;
-}
+const auto totals_answer_table =
+    Table<TotalsAnswer>("Sums over missions; null where no mission measured")
+        .include(totals_table, AT(all))
+        .list("groups", AT(groups), "the sums of each group that has missions; null without group_by",
+              group_table);
 
 Result<Response> totals(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
@@ -228,23 +218,20 @@ Result<Response> totals(const Services& services, const Request& request) {
     return csv_response(
         request, "mission-totals",
         with_accounts({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}),
-        grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}, group_table());
+        grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}, group_table);
   const TotalsAnswer answer{all, grouped ? std::optional(groups) : std::nullopt};
-  return http::json_response(totals_answer_table().text(answer));
+  return http::json_response(totals_answer_table.text(answer));
 }
 
-const Table<Tariff>& tariff_table() {
-  static const auto table = Table<Tariff>("Price and emissions of a kilowatt hour")
-                                .number_or_null("price_per_kwh", &Tariff::price_per_kwh,
-                                                "setting energy.price_per_kwh; null: not set")
-                                .value("currency", &Tariff::currency, "setting energy.currency")
-                                .number_or_null("co2_g_per_kwh", &Tariff::co2_g_per_kwh,
-                                                "setting energy.co2_g_per_kwh, grams; null: not set");
-  return table;
-}
+const auto tariff_table =
+    Table<Tariff>("Price and emissions of a kilowatt hour")
+        .number_or_null("price_per_kwh", AT(price_per_kwh), "setting energy.price_per_kwh; null: not set")
+        .value("currency", AT(currency), "setting energy.currency")
+        .number_or_null("co2_g_per_kwh", AT(co2_g_per_kwh),
+                        "setting energy.co2_g_per_kwh, grams; null: not set");
 
 Result<Response> tariff(const Services& services, const Request&) {
-  return http::json_response(tariff_table().text(services.tariff));
+  return http::json_response(tariff_table.text(services.tariff));
 }
 
 }  // namespace
@@ -279,7 +266,7 @@ Part mission_list_part() {
   rows.add(Method::get, "/v1/tariff", "getTariff", Role::read,
            "Price and emissions of a kilowatt hour, by which the page values energy", "tariff", tariff);
   return {std::move(rows),
-          {{"tariff", tariff_table().schema()}, {"mission-totals", totals_answer_table().schema()}}};
+          {{"tariff", tariff_table.schema()}, {"mission-totals", totals_answer_table.schema()}}};
 }
 
 }  // namespace joulecast::api

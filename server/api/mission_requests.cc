@@ -25,34 +25,29 @@ std::string_view name_of(MissionPhase phase) {
   return phase_names[static_cast<std::size_t>(phase) - 1];
 }
 
-const described::Input<MissionEvent>& mission_event_input() {
-  static const auto input =
-      described::Input<MissionEvent>("Request to begin or end a mission")
-          .choice(
-              "event",
-              [](MissionEvent& event, std::size_t name) {
-                event.phase = static_cast<MissionPhase>(1 + name);
-              },
-              phase_names, "started begins the mission, finished or aborted ends it")
-          .text("mission_id", &MissionEvent::mission_id, signals::max_mission_id_length,
-                "the mission's name, the same when it starts and ends", {},
-                {{"minLength", 1}, {"pattern", "^[A-Za-z0-9._-]+$"}})
-          .number(
-              "payload_kg",
-              [](MissionEvent& event, std::optional<double> given) {
-                event.payload_kg = given.value_or(signals::unmeasured);
-              },
-              {.minimum = 0, .maximum = 1e5},
-              "declared load of the mission, when it starts; null or absent: undeclared")
-          .text("note", &MissionEvent::note, signals::max_note_length, "free text for people", "")
-          .check([](Fields& fields, MissionEvent& event, described::Nothing&) {
-            if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))
-              fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
-            if (fields.ok() && event.phase != MissionPhase::started && std::isfinite(event.payload_kg))
-              fields.fault("payload_kg", "is declared when the mission starts, not when it ends");
-          });
-  return input;
-}
+const auto mission_event_input =
+    described::Input<MissionEvent>("Request to begin or end a mission")
+        .choice(
+            "event",
+            [](MissionEvent& event, std::size_t name) { event.phase = static_cast<MissionPhase>(1 + name); },
+            phase_names, "started begins the mission, finished or aborted ends it")
+        .text("mission_id", &MissionEvent::mission_id, signals::max_mission_id_length,
+              "the mission's name, the same when it starts and ends", {},
+              {{"minLength", 1}, {"pattern", "^[A-Za-z0-9._-]+$"}})
+        .number(
+            "payload_kg",
+            [](MissionEvent& event, std::optional<double> given) {
+              event.payload_kg = given.value_or(signals::unmeasured);
+            },
+            {.minimum = 0, .maximum = 1e5},
+            "declared load of the mission, when it starts; null or absent: undeclared")
+        .text("note", &MissionEvent::note, signals::max_note_length, "free text for people", "")
+        .check([](Fields& fields, MissionEvent& event, described::Nothing&) {
+          if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))
+            fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
+          if (fields.ok() && event.phase != MissionPhase::started && std::isfinite(event.payload_kg))
+            fields.fault("payload_kg", "is declared when the mission starts, not when it ends");
+        });
 
 // The announced or requested mission that is open once the requests before are carried out; empty: none.
 std::string open_mission(const ingest::RobotSnapshot& now, const std::vector<MissionRequest>& requests) {
@@ -89,25 +84,22 @@ struct Requested {
   const MissionEvent& event;
 };
 
-const Table<Requested>& requested_table() {
-  using R = Requested;
-  static const auto table =
-      Table<R>("An accepted request to begin or end a mission")
-          .value("robot_id", &R::robot_id, "id of the robot")
-          .word(
-              "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
-          .value("mission_id", AT(event.mission_id), "as in the request")
-          .time("", AT(event.utime_us),
-                "when the mission begins or ends, by the robot's clock as of its last sample")
-          .number_or_null("payload_kg", AT(event.payload_kg), "as in the request")
-          .value("note", AT(event.note), "as in the request");
-  return table;
-}
+const auto requested_table =
+    Table<Requested>("An accepted request to begin or end a mission")
+        .value("robot_id", AT(robot_id), "id of the robot")
+        .word(
+            "event", [](const Requested& r) { return name_of(r.event.phase); }, phase_names,
+            "as in the request")
+        .value("mission_id", AT(event.mission_id), "as in the request")
+        .time("", AT(event.utime_us),
+              "when the mission begins or ends, by the robot's clock as of its last sample")
+        .number_or_null("payload_kg", AT(event.payload_kg), "as in the request")
+        .value("note", AT(event.note), "as in the request");
 
 Result<Response> request_mission(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY(model_of(services, id));
-  TRY_ASSIGN(MissionEvent event, mission_event_input().read(*request.json));
+  TRY_ASSIGN(MissionEvent event, mission_event_input.read(*request.json));
   TRY_ASSIGN(auto requests, ingest::stored_mission_requests(services.store, id));
   const auto snapshot = services.fleet.find(id);
   const ingest::RobotSnapshot now = snapshot != nullptr ? *snapshot : ingest::RobotSnapshot{};
@@ -123,7 +115,7 @@ Result<Response> request_mission(Services& services, const Request& request) {
   requests.push_back(accepted);
 
   const auto answer = [id, event](std::int64_t) {
-    Response response = http::json_response(requested_table().text({id, event}));
+    Response response = http::json_response(requested_table.text({id, event}));
     response.status = 202;
     return response;
   };
@@ -148,9 +140,9 @@ Part mission_request_part() {
             .success_status = 202,
             .error_statuses = {404, 409, 422},
             .run = Run::write});
-  return {std::move(rows),
-          {{"mission-request", mission_event_input().schema()},
-           {"mission-requested", requested_table().schema()}}};
+  return {
+      std::move(rows),
+      {{"mission-request", mission_event_input.schema()}, {"mission-requested", requested_table.schema()}}};
 }
 
 }  // namespace joulecast::api

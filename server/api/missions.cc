@@ -85,19 +85,16 @@ struct Annulment {
   std::string reason;
 };
 
-const described::Input<Annulment>& annulment_input() {
-  static const auto input =
-      described::Input<Annulment>("Request to annul a mission")
-          .text("reason", &Annulment::reason, most_reason, "reason for the annulment", {}, {{"minLength", 1}})
-          .check([](Fields& fields, Annulment& read, described::Nothing&) {
-            if (fields.ok() && read.reason.empty()) fields.fault("reason", "must not be empty");
-          });
-  return input;
-}
+const auto annulment_input =
+    described::Input<Annulment>("Request to annul a mission")
+        .text("reason", &Annulment::reason, most_reason, "reason for the annulment", {}, {{"minLength", 1}})
+        .check([](Fields& fields, Annulment& read, described::Nothing&) {
+          if (fields.ok() && read.reason.empty()) fields.fault("reason", "must not be empty");
+        });
 
 // Excludes an ended mission from all sums and from the training of forecasts. Lists keep it, with the reason.
 Result<Response> annul(Services& services, const Request& request) {
-  TRY_ASSIGN(const auto [reason], annulment_input().read(*request.json));
+  TRY_ASSIGN(const auto [reason], annulment_input.read(*request.json));
   TRY_ASSIGN(history::Mission mission, mission_of(services, request));
   if (mission.state == history::MissionState::open)
     return fail(Fault::conflict, "id", "the mission is still open; only one that ended can be annulled");
@@ -137,23 +134,19 @@ Response covariates_csv(const Request& request, const history::CovariatePage& pa
   return csv.response("mission-" + std::to_string(key) + "-covariates", page.next_cursor);
 }
 
-const Table<history::Mission>& mission_ledger_table() {
-  using M = history::Mission;
-  static const auto table =
-      Table<M>("Ledger of a mission")
-          .value("id", &M::key, "number of the mission, as in /v1/missions/{id}")
-          .value("robot_id", &M::robot_id, "the robot's id, as in its telemetry and its file")
-          .value("mission_id", &M::mission_id, "the robot's identifier of the mission")
-          .value("model_version", &M::model_version,
-                 "model version of the modelled energy; null: the robot had none")
-          .object("ledger", &M::accounts, "energy by term", answers::ledger_table());
-  return table;
-}
+const auto mission_ledger_table =
+    Table<history::Mission>("Ledger of a mission")
+        .value("id", AT(key), "number of the mission, as in /v1/missions/{id}")
+        .value("robot_id", AT(robot_id), "the robot's id, as in its telemetry and its file")
+        .value("mission_id", AT(mission_id), "the robot's identifier of the mission")
+        .value("model_version", AT(model_version),
+               "model version of the modelled energy; null: the robot had none")
+        .object("ledger", AT(accounts), "energy by term", answers::ledger_table());
 
 Result<Response> ledger(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::Mission mission, mission_of(services, request));
   if (request.csv) return ledger_csv(request, mission);
-  return http::json_response(mission_ledger_table().text(mission));
+  return http::json_response(mission_ledger_table.text(mission));
 }
 
 Response trace_csv(const Request& request, const history::Trace& trace, history::MissionKey key) {
@@ -185,13 +178,15 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
   return csv.response("mission-" + std::to_string(key) + "-telemetry", page.next_cursor);
 }
 
+using Bucket = history::TraceBucket;
+
 struct TraceAnswer {
   history::MissionKey key;
   const history::Trace& trace;
 };
 struct BandAnswer {
   const history::Trace& trace;
-  history::Band history::TraceBucket::*member;
+  history::Band Bucket::*member;
 };
 
 // A value of each item.
@@ -201,7 +196,7 @@ std::vector<double> column_of(const Items& items, Get get) {
   return {values.begin(), values.end()};
 }
 
-auto of_spans(double history::TraceBucket::*member) {
+auto of_spans(double Bucket::*member) {
   return [member](const TraceAnswer& a) { return column_of(a.trace.buckets, member); };
 }
 
@@ -209,6 +204,10 @@ auto of_band(double history::Band::*member) {
   return [member](const BandAnswer& a) {
     return column_of(a.trace.buckets, [&](const auto& bucket) { return bucket.*a.member.*member; });
   };
+}
+
+auto as_band(history::Band Bucket::*member) {
+  return [member](const TraceAnswer& a) { return BandAnswer{a.trace, member}; };
 }
 
 Table<BandAnswer> make_band(int places) {
@@ -219,42 +218,34 @@ Table<BandAnswer> make_band(int places) {
       .column("max", of_band(&Band::max), "greatest", places, true);
 }
 
-const Table<TraceAnswer>& trace_table() {
-  using A = TraceAnswer;
-  using B = history::TraceBucket;
-  const auto band = [](history::Band B::*member) {
-    return [member](const A& a) { return BandAnswer{a.trace, member}; };
-  };
-  static const auto powers = make_band(3), speeds = make_band(4);
-  static const auto table =
-      Table<A>("A mission over time, in columns")
-          .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
-          .value("width_us", AT(trace.width_us), "length of each span")
-          .integers(
-              "start_utime_us",
-              [](const A& a) { return a.trace.buckets | std::views::transform(&B::start_utime_us); },
-              "start of each span, microseconds since 1970 by the robot's clock")
-          .column("covered_s", of_spans(&B::covered_s), "time of each span with telemetry", 6, true)
-          .object("measured_power_w", band(&B::measured_power_w), "power from the battery by the sensors",
-                  powers)
-          .object("modelled_power_w", band(&B::modelled_power_w), "power from the battery by the model",
-                  powers)
-          .object("speed_m_s", band(&B::speed_m_s), "forward speed", speeds)
-          .column("state_of_charge", of_spans(&B::state_of_charge), "at the end of each span", 6, true)
-          .column("measured_j", of_spans(&B::measured_j),
-                  "measured energy since the mission began, at the end of each span", 3, true)
-          .column("modelled_j", of_spans(&B::modelled_j),
-                  "modelled energy since the mission began, at the end of each span", 3, true)
-          .column("x_m", of_spans(&B::x_m), "mean place of each span", 4, true)
-          .column("y_m", of_spans(&B::y_m), "mean place of each span", 4, true);
-  return table;
-}
+const auto power_table = make_band(3), speed_table = make_band(4);
+const auto trace_table =
+    Table<TraceAnswer>("A mission over time, in columns")
+        .value("id", AT(key), "number of the mission, as in /v1/missions/{id}")
+        .value("width_us", AT(trace.width_us), "length of each span")
+        .integers(
+            "start_utime_us",
+            [](const TraceAnswer& a) { return a.trace.buckets | std::views::transform(AT(start_utime_us)); },
+            "start of each span, microseconds since 1970 by the robot's clock")
+        .column("covered_s", of_spans(&Bucket::covered_s), "time of each span with telemetry", 6, true)
+        .object("measured_power_w", as_band(&Bucket::measured_power_w),
+                "power from the battery by the sensors", power_table)
+        .object("modelled_power_w", as_band(&Bucket::modelled_power_w), "power from the battery by the model",
+                power_table)
+        .object("speed_m_s", as_band(&Bucket::speed_m_s), "forward speed", speed_table)
+        .column("state_of_charge", of_spans(&Bucket::state_of_charge), "at the end of each span", 6, true)
+        .column("measured_j", of_spans(&Bucket::measured_j),
+                "measured energy since the mission began, at the end of each span", 3, true)
+        .column("modelled_j", of_spans(&Bucket::modelled_j),
+                "modelled energy since the mission began, at the end of each span", 3, true)
+        .column("x_m", of_spans(&Bucket::x_m), "mean place of each span", 4, true)
+        .column("y_m", of_spans(&Bucket::y_m), "mean place of each span", 4, true);
 
 Result<Response> trace(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   TRY_ASSIGN(const auto found, services.store.trace(span.key, span.range, *request.query_integer("points")));
   if (request.csv) return trace_csv(request, found, span.key);
-  return http::json_response(trace_table().text({span.key, found}));
+  return http::json_response(trace_table.text({span.key, found}));
 }
 
 struct TelemetryAnswer {
@@ -315,16 +306,13 @@ Table<TelemetryAnswer> make_telemetry() {
   return table;
 }
 
-const Table<TelemetryAnswer>& telemetry_table() {
-  static const auto table = make_telemetry();
-  return table;
-}
+const auto telemetry_table = make_telemetry();
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   TRY_ASSIGN(const auto found, services.store.telemetry(span.key, span.range, page_of(request)));
   if (request.csv) return telemetry_csv(request, found, span.key);
-  return http::json_response(telemetry_table().text({span.key, found}));
+  return http::json_response(telemetry_table.text({span.key, found}));
 }
 
 struct CovariatesAnswer {
@@ -332,28 +320,24 @@ struct CovariatesAnswer {
   const history::CovariatePage& page;
 };
 
-const Table<CovariatesAnswer>& covariates_table() {
-  using A = CovariatesAnswer;
-  using C = signals::CovariateSeries;
-  static const auto series =
-      Table<C>()
-          .value("name", &C::name, "with its unit; a label as name=label")
-          .integers("utime_us", &C::utime_us, "start of each value, which is valid until the next one")
-          .exact("value", &C::value, "of a label 1 (set) or 0 (not set); null: unknown from then on");
-  static const auto table = Table<A>("Changes of a mission's covariates, one series per name")
-                                .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
-                                .list(
-                                    "covariates", [](const A& a) { return signals::series_of(a.page.items); },
-                                    "in the order of their first change in the page", series)
-                                .text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
-  return table;
-}
+const auto series_table =
+    Table<signals::CovariateSeries>()
+        .value("name", AT(name), "with its unit; a label as name=label")
+        .integers("utime_us", AT(utime_us), "start of each value, which is valid until the next one")
+        .exact("value", AT(value), "of a label 1 (set) or 0 (not set); null: unknown from then on");
+const auto covariates_table =
+    Table<CovariatesAnswer>("Changes of a mission's covariates, one series per name")
+        .value("id", AT(key), "number of the mission, as in /v1/missions/{id}")
+        .list(
+            "covariates", [](const CovariatesAnswer& a) { return signals::series_of(a.page.items); },
+            "in the order of their first change in the page", series_table)
+        .text_or_null("next_cursor", AT(page.next_cursor), described::cursor_words);
 
 Result<Response> covariates(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   TRY_ASSIGN(const auto found, services.store.covariates(span.key, span.range, page_of(request)));
   if (request.csv) return covariates_csv(request, found, span.key);
-  return http::json_response(covariates_table().text({span.key, found}));
+  return http::json_response(covariates_table.text({span.key, found}));
 }
 
 }  // namespace
@@ -418,15 +402,15 @@ Part mission_part() {
             .etag = true,
             .error_statuses = {404}});
   return {std::move(rows),
-          {{"annul-request", annulment_input().schema()},
+          {{"annul-request", annulment_input.schema()},
            {"mission", answers::mission_table().schema()},
-           {"mission-ledger", mission_ledger_table().schema()},
+           {"mission-ledger", mission_ledger_table.schema()},
            {"mission-page",
             described::of_page("A page of missions", "missions", "missions in the requested order",
                                answers::mission_table().of_member())},
-           {"mission-covariates", covariates_table().schema()},
-           {"mission-telemetry", telemetry_table().schema()},
-           {"mission-trace", trace_table().schema()}}};
+           {"mission-covariates", covariates_table.schema()},
+           {"mission-telemetry", telemetry_table.schema()},
+           {"mission-trace", trace_table.schema()}}};
 }
 
 }  // namespace joulecast::api

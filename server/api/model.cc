@@ -144,22 +144,17 @@ struct AdoptionAnswer {
   std::string back_test_json = {};
 };
 
-const Table<AdoptionAnswer>& adoption_table() {
-  using A = AdoptionAnswer;
-  static const auto table =
-      Table<A>("Result of adopting a model")
-          .value("robot_id", &A::robot_id, "the robot's id, as in its telemetry and its file")
-          .value("adopted", &A::adopted,
-                 "false: the back-test showed no improvement, or no parameter changes")
-          .value("model_version", &A::version, "in force now")
-          .value(
-              "previous_version",
-              [](const A& a) { return a.previous > 0 ? std::optional(a.previous) : std::nullopt; },
-              "version in force before; null: none")
-          .json("back_test", &A::back_test_json, "errors of both models on past missions; null: no back-test",
-                described::or_null(described::of_reference("back-test"), true));
-  return table;
-}
+const auto adoption_table =
+    Table<AdoptionAnswer>("Result of adopting a model")
+        .value("robot_id", AT(robot_id), "the robot's id, as in its telemetry and its file")
+        .value("adopted", AT(adopted), "false: the back-test showed no improvement, or no parameter changes")
+        .value("model_version", AT(version), "in force now")
+        .value(
+            "previous_version",
+            [](const AdoptionAnswer& a) { return a.previous > 0 ? std::optional(a.previous) : std::nullopt; },
+            "version in force before; null: none")
+        .json("back_test", AT(back_test_json), "errors of both models on past missions; null: no back-test",
+              described::or_null(described::of_reference("back-test"), true));
 
 Result<Response> roll(Services& services, const Request& request, const ModelRequest& r) {
   const std::string& id = request.param("id");
@@ -171,7 +166,7 @@ Result<Response> roll(Services& services, const Request& request, const ModelReq
                       std::to_string(*r.expected_version));
   }
   const auto answer = [id, version = *r.version](std::int64_t previous) {
-    return http::json_response(adoption_table().text({id, true, version, previous}));
+    return http::json_response(adoption_table.text({id, true, version, previous}));
   };
   RequestChange change(services, request);
   Result<std::int64_t> previous =
@@ -190,7 +185,7 @@ Result<Response> post_model(Services& services, const Request& request) {
   if (read.version) return roll(services, request, read);
   TRY_ASSIGN(const server::AdoptionRequest wanted, adoption_of(services, id, read));
   const auto answer = [id](const server::Adoption& adoption, std::int64_t version) {
-    return http::json_response(adoption_table().text(
+    return http::json_response(adoption_table.text(
         {id, adoption.adopted, version, adoption.previous_version, adoption.back_test_json}));
   };
   RequestChange change(services, request);
@@ -224,22 +219,18 @@ struct Difference {
   std::string changes_json;
 };
 
-const Table<Difference>& difference_table() {
-  using described::with_words;
-  using D = Difference;
-  static const Schema change = described::of_object(
-      {}, {},
-      {{"path", with_words(described::of_type("string"), "JSON pointer into the robot file")},
-       {"from", with_words(Schema::object(), "null: absent")},
-       {"to", with_words(Schema::object(), "null: absent")}});
-  static const auto table =
-      Table<D>("Differences between two versions of a robot's model")
-          .value("robot_id", &D::robot_id, "the robot's id, as in its telemetry and its file")
-          .value("from", &D::from, "the earlier version")
-          .value("to", &D::to, "the later version")
-          .json("changes", &D::changes_json, "differences, one entry per value", described::of_array(change));
-  return table;
-}
+const Schema change_schema = described::of_object(
+    {}, {},
+    {{"path", described::with_words(described::of_type("string"), "JSON pointer into the robot file")},
+     {"from", described::with_words(Schema::object(), "null: absent")},
+     {"to", described::with_words(Schema::object(), "null: absent")}});
+const auto difference_table =
+    Table<Difference>("Differences between two versions of a robot's model")
+        .value("robot_id", AT(robot_id), "the robot's id, as in its telemetry and its file")
+        .value("from", AT(from), "the earlier version")
+        .value("to", AT(to), "the later version")
+        .json("changes", AT(changes_json), "differences, one entry per value",
+              described::of_array(change_schema));
 
 Result<Response> diff(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
@@ -256,7 +247,7 @@ Result<Response> diff(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::ModelVersion from, before ? version_of(before, "from") : to);
   Json changes = Json::array();
   compare(Json::parse(from.model_json), Json::parse(to.model_json), "", changes);
-  return http::json_response(difference_table().text({id, from.version, to.version, changes.dump()}));
+  return http::json_response(difference_table.text({id, from.version, to.version, changes.dump()}));
 }
 
 history::ProposalState state_of(const Services& services, const history::Proposal& p) {
@@ -269,34 +260,31 @@ struct ProposalAnswer {
   const std::map<std::int64_t, std::string>& dismissed;
 };
 
-const Table<ProposalAnswer>& proposal_table() {
-  using described::of_type;
-  using A = ProposalAnswer;
-  static const auto table =
-      Table<A>()
-          .value("id", AT(proposal.id), "number of the proposal")
-          .value("robot_id", AT(proposal.robot_id), "robot with the model to change")
-          .time("created", AT(proposal.created_utime_us),
-                "time of creation, microseconds since 1970 by the host's clock")
-          .value("kind", AT(proposal.kind), "calibration: refined by the robot's own missions")
-          .word(
-              "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); },
-              history::names_of<history::ProposalState>,
-              "superseded: a later one or another version took its place")
-          .value(
-              "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal, a.dismissed); },
-              "why it is not offered: closed, or made for another version; null for one that is offered")
-          .value("note", AT(proposal.note), "summary of the change, in a sentence")
-          .value("base_version", AT(proposal.base_version), "version of the model that it changes")
-          .value("adopted_version", AT(proposal.adopted_version),
-                 "version that it became; null: it was not adopted")
-          .integers("fitted_on", AT(proposal.fitted_on),
-                    "missions used to fit it, and excluded from its back-test")
-          .json("model", AT(proposal.model_json), "the proposed model, as a robot file", of_type("object"))
-          .json("detail", AT(proposal.detail_json), "the parameters that it changes, and its back_test",
-                of_type("object"));
-  return table;
-}
+const auto proposal_table =
+    Table<ProposalAnswer>()
+        .value("id", AT(proposal.id), "number of the proposal")
+        .value("robot_id", AT(proposal.robot_id), "robot with the model to change")
+        .time("created", AT(proposal.created_utime_us),
+              "time of creation, microseconds since 1970 by the host's clock")
+        .value("kind", AT(proposal.kind), "calibration: refined by the robot's own missions")
+        .word(
+            "state", [](const ProposalAnswer& a) { return history::name(state_of(a.services, a.proposal)); },
+            history::names_of<history::ProposalState>,
+            "superseded: a later one or another version took its place")
+        .value(
+            "closed_reason",
+            [](const ProposalAnswer& a) { return closed_reason(a.services, a.proposal, a.dismissed); },
+            "why it is not offered: closed, or made for another version; null for one that is offered")
+        .value("note", AT(proposal.note), "summary of the change, in a sentence")
+        .value("base_version", AT(proposal.base_version), "version of the model that it changes")
+        .value("adopted_version", AT(proposal.adopted_version),
+               "version that it became; null: it was not adopted")
+        .integers("fitted_on", AT(proposal.fitted_on),
+                  "missions used to fit it, and excluded from its back-test")
+        .json("model", AT(proposal.model_json), "the proposed model, as a robot file",
+              described::of_type("object"))
+        .json("detail", AT(proposal.detail_json), "the parameters that it changes, and its back_test",
+              described::of_type("object"));
 
 Result<Response> proposals_of(const Services& services, const Request& request,
                               const std::optional<std::string>& id) {
@@ -306,7 +294,7 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   const std::string next = next_id_cursor(found, limit, &history::Proposal::id);
   const auto dismissed = dismissals(services, found);
   const auto write = [&](JsonWriter& out, const history::Proposal& proposal) {
-    proposal_table().write(out, {services, proposal, dismissed});
+    proposal_table.write(out, {services, proposal, dismissed});
   };
   if (request.csv)
     return csv_response(request, "proposals",
@@ -366,11 +354,11 @@ Part model_part() {
   const Schema robot =
       described::with_words(described::of_type("string", true), "null in the list of the fleet");
   return {std::move(rows),
-          {{"model-adoption", adoption_table().schema()},
+          {{"model-adoption", adoption_table.schema()},
            {"proposal-list",
             described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
-                               proposal_table().of_member(), {{"robot_id", robot}})},
-           {"model-diff", difference_table().schema()}}};
+                               proposal_table.of_member(), {{"robot_id", robot}})},
+           {"model-diff", difference_table.schema()}}};
 }
 
 }  // namespace joulecast::api

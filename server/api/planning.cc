@@ -51,30 +51,22 @@ struct BatteryRow {
 
 constexpr const char* id_words = "the robot's id, as in its telemetry and its file";
 
-const Table<ProblemRow>& problem_table() {
-  static const auto error =
-      Table<Error>()
-          .word(
-              "fault", [](const Error& e) { return name_of(e.fault); },
-              std::array{"invalid", "not_found", "infeasible", "internal"}, "kind of the problem")
-          .value("field", &Error::field, "field of the request at fault; empty: none")
-          .value("message", &Error::message, "the problem in a sentence");
-  using R = ProblemRow;
-  static const auto table =
-      Table<R>({}, "problem of a robot without a forecast")
-          .value("robot_id", &R::robot_id, id_words)
-          .object("problem", AT(error), "the reason why this robot has no forecast", error);
-  return table;
-}
+const auto error_table =
+    Table<Error>()
+        .word(
+            "fault", [](const Error& e) { return name_of(e.fault); },
+            std::array{"invalid", "not_found", "infeasible", "internal"}, "kind of the problem")
+        .value("field", AT(field), "field of the request at fault; empty: none")
+        .value("message", AT(message), "the problem in a sentence");
+const auto problem_table =
+    Table<ProblemRow>({}, "problem of a robot without a forecast")
+        .value("robot_id", AT(robot_id), id_words)
+        .object("problem", AT(error), "the reason why this robot has no forecast", error_table);
 
-const Table<BatteryRow>& battery_table() {
-  using R = BatteryRow;
-  static const auto table = Table<R>({}, "in another dialect")
-                                .value("robot_id", &R::robot_id, id_words)
-                                .json("battery", &R::message, "in the requested dialect",
-                                      described::of_reference("battery-status"));
-  return table;
-}
+const auto battery_table =
+    Table<BatteryRow>({}, "in another dialect")
+        .value("robot_id", AT(robot_id), id_words)
+        .json("battery", AT(message), "in the requested dialect", described::of_reference("battery-status"));
 
 // Request for all robots without a request of their own.
 struct Common {
@@ -110,7 +102,7 @@ Result<std::string> answer_autonomy(const Row& row, const Common& common, const 
                                       .map_error(within(row.at)));
   std::string text = answers::autonomy_json(request, autonomy, robot, now);
   if (request.dialect == answers::Dialect::joulecast) return text;
-  return battery_table().text({row.robot_id, text});
+  return battery_table.text({row.robot_id, text});
 }
 
 const Json* request_of(Fields& fields) {
@@ -125,41 +117,36 @@ struct FleetRequest {
   std::vector<Row> rows;
 };
 
-const described::Input<FleetRequest>& fleet_input() {
-  using described::Input;
-  using described::Nothing;
-  static const auto row =
-      Input<Row>()
-          .text("robot_id", &Row::robot_id, 256, "the robot's id, as in its telemetry and its file")
-          .custom("request", described::of_reference("autonomy-request"), "instead of the common request",
-                  [](Fields& own, Row& read, Nothing&) {
-                    const Json* request = request_of(own);
-                    if (request == nullptr) return;
-                    read.at = own.pointer("request");
-                    read.own = answers::read_autonomy(*request, false, read.at);
-                  });
-  static const auto input =
-      Input<FleetRequest>("Autonomy of several robots")
-          .custom("request", described::of_reference("autonomy-request"),
-                  "request for all robots without their own",
-                  [](Fields& fields, FleetRequest& read, Nothing&) {
-                    read.shared = request_of(fields);
-                    read.whole_fleet = !fields.has("robots");
-                  })
-          .list("robots", &FleetRequest::rows, {0, 10'000, "robots"}, "default: every robot that has a model",
-                described::OrText(&Row::robot_id, "the robot's id; its request is the common one", row),
-                described::Presence::optional);
-  return input;
-}
+const auto row_input =
+    described::Input<Row>()
+        .text("robot_id", &Row::robot_id, 256, "the robot's id, as in its telemetry and its file")
+        .custom("request", described::of_reference("autonomy-request"), "instead of the common request",
+                [](Fields& own, Row& read, described::Nothing&) {
+                  const Json* request = request_of(own);
+                  if (request == nullptr) return;
+                  read.at = own.pointer("request");
+                  read.own = answers::read_autonomy(*request, false, read.at);
+                });
+const auto fleet_input =
+    described::Input<FleetRequest>("Autonomy of several robots")
+        .custom("request", described::of_reference("autonomy-request"),
+                "request for all robots without their own",
+                [](Fields& fields, FleetRequest& read, described::Nothing&) {
+                  read.shared = request_of(fields);
+                  read.whole_fleet = !fields.has("robots");
+                })
+        .list("robots", &FleetRequest::rows, {0, 10'000, "robots"}, "default: every robot that has a model",
+              described::OrText(&Row::robot_id, "the robot's id; its request is the common one", row_input),
+              described::Presence::optional);
 
 described::Schemas fleet_autonomy_schemas() {
-  const Schema row{{"anyOf",
-                    {described::of_reference("robot-autonomy"), battery_table().of_member(),
-                     problem_table().of_member()}}};
+  const Schema row{
+      {"anyOf",
+       {described::of_reference("robot-autonomy"), battery_table.of_member(), problem_table.of_member()}}};
   const Schema rows = described::with_words(
       described::of_array(row),
       "one element per robot in the requested order; a robot without a forecast has a problem");
-  return {{"fleet-autonomy-request", fleet_input().schema()},
+  return {{"fleet-autonomy-request", fleet_input.schema()},
           {"fleet-autonomy",
            described::of_object(
                "Autonomy of several robots, one row per robot in the requested order, by default by id", {},
@@ -168,7 +155,7 @@ described::Schemas fleet_autonomy_schemas() {
 
 // {"robots": [...], "request": {...}}; one row per robot in the requested order, by default by id.
 Result<Response> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
-  TRY_ASSIGN(auto read, fleet_input().read(body));
+  TRY_ASSIGN(auto read, fleet_input.read(body));
   std::vector<Row>& rows = read.rows;
   if (read.whole_fleet)
     for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id});
@@ -182,7 +169,7 @@ Result<Response> fleet_autonomy_answer(const Json& body, Services& services, con
   parallel_for(rows.size(), 2, [&](std::size_t k) {
     if (stop.stop_requested()) return;
     auto text = answer_autonomy(rows[k], common, services, stop);
-    texts[k] = text ? std::move(*text) : problem_table().text({rows[k].robot_id, text.error()});
+    texts[k] = text ? std::move(*text) : problem_table.text({rows[k].robot_id, text.error()});
   });
   if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");
   JsonWriter out;

@@ -80,36 +80,28 @@ std::string_view origin_of(const ModelVersion& version) {
   return history::name(version.origin);
 }
 
-const Table<ModelVersion>& detail_table() {
-  using V = ModelVersion;
-  static const auto table =
-      Table<V>("A robot and its model in force")
-          .value("robot_id", &V::robot_id, id_of_robot_words)
-          .value("model_version", &V::version, "version in force")
-          .word("origin", origin_of, history::names_of<history::ModelOrigin>, "where the model came from")
-          .time("created", &V::created_utime_us, created_words)
-          .compact_json("model", &V::model_json, "the robot file, robot.schema.json",
-                        described::of_type("object"));
-  return table;
-}
+const auto detail_table =
+    Table<ModelVersion>("A robot and its model in force")
+        .value("robot_id", AT(robot_id), id_of_robot_words)
+        .value("model_version", AT(version), "version in force")
+        .word("origin", origin_of, history::names_of<history::ModelOrigin>, "where the model came from")
+        .time("created", AT(created_utime_us), created_words)
+        .compact_json("model", AT(model_json), "the robot file, robot.schema.json",
+                      described::of_type("object"));
 
-const Table<ModelVersion>& version_table() {
-  using V = ModelVersion;
-  static const auto table =
-      Table<V>("A version of a robot's model")
-          .named("model")
-          .value("model_version", &V::version, "number of the version")
-          .time("created", &V::created_utime_us, created_words)
-          .value("origin", origin_of, "where the model came from")
-          .value("note", &V::note, "note of its author")
-          .value("active", &V::active, "whether it is in force")
-          .value("parent_version", &V::parent_version, "version from which it was derived; null: none")
-          .compact_json("model", &V::model_json, "the model, as a robot file", described::of_type("object"))
-          .json("evidence", &V::evidence_json,
-                "basis of its adoption: its back-test, and its diagnosis or proposal",
-                described::of_type("object", true));
-  return table;
-}
+const auto version_table =
+    Table<ModelVersion>("A version of a robot's model")
+        .named("model")
+        .value("model_version", AT(version), "number of the version")
+        .time("created", AT(created_utime_us), created_words)
+        .value("origin", origin_of, "where the model came from")
+        .value("note", AT(note), "note of its author")
+        .value("active", AT(active), "whether it is in force")
+        .value("parent_version", AT(parent_version), "version from which it was derived; null: none")
+        .compact_json("model", AT(model_json), "the model, as a robot file", described::of_type("object"))
+        .json("evidence", AT(evidence_json),
+              "basis of its adoption: its back-test, and its diagnosis or proposal",
+              described::of_type("object", true));
 
 // The answer to a robot file that was stored.
 struct Stored {
@@ -118,20 +110,16 @@ struct Stored {
   const std::vector<robot::ReviewFinding>& findings;
 };
 
-const Table<Stored>& stored_table() {
-  using F = robot::ReviewFinding;
-  static const auto warning = Table<F>()
-                                  .value("field", &F::field, "JSON pointer into the model")
-                                  .value("value", &F::value, "the value, in the unit given in `says`")
-                                  .value("says", &F::says, "the same in a sentence");
-  static const auto table =
-      Table<Stored>("Version of a stored robot model")
-          .value("robot_id", &Stored::robot_id, id_of_robot_words)
-          .value("model_version", &Stored::version, "version that is in force now")
-          .list("warnings", AT(findings),
-                "values of the model that are within all bounds but implausible; empty: none", warning);
-  return table;
-}
+const auto warning_table = Table<robot::ReviewFinding>()
+                               .value("field", AT(field), "JSON pointer into the model")
+                               .value("value", AT(value), "the value, in the unit given in `says`")
+                               .value("says", AT(says), "the same in a sentence");
+const auto stored_table =
+    Table<Stored>("Version of a stored robot model")
+        .value("robot_id", AT(robot_id), id_of_robot_words)
+        .value("model_version", AT(version), "version that is in force now")
+        .list("warnings", AT(findings),
+              "values of the model that are within all bounds but implausible; empty: none", warning_table);
 
 struct Removal {
   std::string robot_id;
@@ -139,22 +127,18 @@ struct Removal {
   std::int64_t missions;
 };
 
-const Table<Removal>& removal_table() {
-  using R = Removal;
-  static const auto table =
-      Table<R>("Result of removing a robot")
-          .value("robot_id", &R::robot_id, "the robot that was removed")
-          .word("history", &R::history, std::array{"keep", "purge"},
-                "whether its missions and models are kept or deleted")
-          .value("missions_deleted", &R::missions, "missions deleted with it", {{"minimum", 0}});
-  return table;
-}
+const auto removal_table =
+    Table<Removal>("Result of removing a robot")
+        .value("robot_id", AT(robot_id), "the robot that was removed")
+        .word("history", AT(history), std::array{"keep", "purge"},
+              "whether its missions and models are kept or deleted")
+        .value("missions_deleted", AT(missions), "missions deleted with it", {{"minimum", 0}});
 
 Result<Response> get_robot(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY(model_of(services, id));
   TRY_ASSIGN(const history::ModelVersion model, services.store.model(id));
-  return http::json_response(detail_table().text(model));
+  return http::json_response(detail_table.text(model));
 }
 
 // Faults and suspicious values of a robot file, and the figures that follow from a correct one.
@@ -163,29 +147,22 @@ struct RobotCheck {
   robot::Figures figures{signals::unmeasured, signals::unmeasured, signals::unmeasured, signals::unmeasured};
 };
 
-const Table<RobotCheck>& check_table() {
-  using C = RobotCheck;
-  static const auto finding = Table<robot::ReviewFinding>()
-                                  .value("fault", &robot::ReviewFinding::fault,
-                                         "true: the file is not accepted; false: suspicious only")
-                                  .value("field", &robot::ReviewFinding::field, "JSON pointer into the file")
-                                  .value("says", &robot::ReviewFinding::says, "the fault in a sentence");
-  const auto figure = [](double robot::Figures::*member) {
-    return [member](const C& check) { return check.figures.*member; };
-  };
-  static const auto table =
-      Table<C>("Review of a robot file")
-          .list("findings", &C::findings, "faults first; empty: none", finding)
-          .number_or_null("top_speed_m_s", figure(&robot::Figures::top_speed_m_s),
-                          "speed that the motors reach on the flat; these and the following are null if the "
-                          "file is not accepted")
-          .number_or_null("acceleration_m_s2", figure(&robot::Figures::acceleration_m_s2),
-                          "greatest acceleration from standing")
-          .number_or_null("energy_wh", figure(&robot::Figures::energy_wh), "energy of a full battery, Wh")
-          .number_or_null("standing_h", figure(&robot::Figures::standing_h),
-                          "time that a full battery lasts at idle power, h; null: unlimited");
-  return table;
-}
+const auto finding_table =
+    Table<robot::ReviewFinding>()
+        .value("fault", AT(fault), "true: the file is not accepted; false: suspicious only")
+        .value("field", AT(field), "JSON pointer into the file")
+        .value("says", AT(says), "the fault in a sentence");
+const auto check_table =
+    Table<RobotCheck>("Review of a robot file")
+        .list("findings", AT(findings), "faults first; empty: none", finding_table)
+        .number_or_null("top_speed_m_s", AT(figures.top_speed_m_s),
+                        "speed that the motors reach on the flat; these and the following are null if the "
+                        "file is not accepted")
+        .number_or_null("acceleration_m_s2", AT(figures.acceleration_m_s2),
+                        "greatest acceleration from standing")
+        .number_or_null("energy_wh", AT(figures.energy_wh), "energy of a full battery, Wh")
+        .number_or_null("standing_h", AT(figures.standing_h),
+                        "time that a full battery lasts at idle power, h; null: unlimited");
 
 Result<Response> check_file(const Services&, const Request& request) {
   RobotCheck check;
@@ -199,7 +176,7 @@ Result<Response> check_file(const Services&, const Request& request) {
     check.findings.insert(check.findings.end(), reviewed.begin(), reviewed.end());
     check.figures = robot::figures_of(model);
   }
-  return http::json_response(check_table().text(check));
+  return http::json_response(check_table.text(check));
 }
 
 Result<Response> put(Services& services, const Request& request) {
@@ -214,7 +191,7 @@ Result<Response> put(Services& services, const Request& request) {
   TRY(robot::plannable(findings));
   RequestChange change(services, request);
   return change.result(services.adoption.put(robot, change.answered_by([id, findings](std::int64_t version) {
-    return http::json_response(stored_table().text({id, version, findings}));
+    return http::json_response(stored_table.text({id, version, findings}));
   })));
 }
 
@@ -245,7 +222,7 @@ Result<Response> remove(Services& services, const Request& request) {
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by(
       [id, history](std::int64_t missions) {
-        return http::json_response(removal_table().text({id, history, missions}));
+        return http::json_response(removal_table.text({id, history, missions}));
       },
       history::RemoveRobot{id, history == "purge"});
   change.add_before([id, history, now = services.now_utime_us()](std::int64_t missions) {
@@ -280,7 +257,7 @@ Result<Response> versions(const Services& services, const Request& request) {
   const std::span page(std::ranges::find_if(found, is_next), found.end());
   const auto shown = page.first(std::min(limit, page.size()));
   // The former path's answer is as before.
-  return page_response(request.deprecated ? "versions" : "models", shown, version_table(),
+  return page_response(request.deprecated ? "versions" : "models", shown, version_table,
                        shown.size() == page.size() ? "" : std::to_string(shown.back().version),
                        [&](JsonWriter& json) { json.field("robot_id", request.param("id")); });
 }
@@ -290,7 +267,7 @@ Result<Response> get_version(const Services& services, const Request& request) {
   TRY(model_of(services, id));
   TRY_ASSIGN(const std::int64_t version, path_id(request, "model version", "version"));
   Result<history::ModelVersion> found = services.store.model(id, version);
-  if (found) return http::json_response(version_table().text(*found));
+  if (found) return http::json_response(version_table.text(*found));
   found.error().field = "version";
   return tl::unexpected(std::move(found.error()));
 }
@@ -339,16 +316,16 @@ Part robot_part() {
   using described::of_page;
   const Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
   return {std::move(rows),
-          {{"model", version_table().schema()},
-           {"robot-check", check_table().schema()},
-           {"robot-detail", detail_table().schema()},
+          {{"model", version_table.schema()},
+           {"robot-check", check_table.schema()},
+           {"robot-detail", detail_table.schema()},
            {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
-           {"robot-removal", removal_table().schema()},
+           {"robot-removal", removal_table.schema()},
            {"robot-state", state_table().schema()},
-           {"robot-version", stored_table().schema()},
-           {"model-list", of_page("All versions of a robot model, newest first", "models",
-                                  "versions of the model, newest first", version_table().of_member(),
-                                  {{"robot_id", id}})}}};
+           {"robot-version", stored_table.schema()},
+           {"model-list",
+            of_page("All versions of a robot model, newest first", "models",
+                    "versions of the model, newest first", version_table.of_member(), {{"robot_id", id}})}}};
 }
 
 }  // namespace joulecast::api

@@ -46,33 +46,25 @@ std::vector<std::string> robots_of(const Endpoint& endpoint, const Request& requ
   return listed(request.query_value("robot_id").value_or(std::string_view{}));
 }
 
-const described::Table<Token>& token_table() {
-  static const std::array roles{access::name(Role::read), access::name(Role::plan),
-                                access::name(Role::operate), access::name(Role::admin)};
-  static const auto table =
-      described::Table<Token>("Token of the session")
-          .value("name", &Token::name, "name of the token")
-          .word(
-              "role", [](const Token& t) { return access::name(t.role); }, roles, "permissions of the token")
-          .text_or_null("robots", &Token::robots, "shell pattern of the permitted robot ids; null: all")
-          .value("expires",
-                 [](const Token& t) {
-                   return t.expires_utime_us == 0 ? std::nullopt
-                                                  : std::optional(utc_text(t.expires_utime_us));
-                 },
-                 "end of the token, which ends its sessions; null: none", {{"format", "date-time"}});
-  return table;
-}
+const auto token_table =
+    described::Table<Token>("Token of the session")
+        .value("name", AT(name), "name of the token")
+        .word(
+            "role", [](const Token& t) { return access::name(t.role); },
+            std::array{"read", "plan", "operate", "admin"}, "permissions of the token")
+        .text_or_null("robots", AT(robots), "shell pattern of the permitted robot ids; null: all")
+        .value("expires",
+               [](const Token& t) {
+                 return t.expires_utime_us == 0 ? std::nullopt : std::optional(utc_text(t.expires_utime_us));
+               },
+               "end of the token, which ends its sessions; null: none", {{"format", "date-time"}});
 
-const described::Input<std::string>& session_input() {
-  static const auto input =
-      described::Input<std::string>("Start of a session")
-          .text("token", std::identity(), longest_text, "token as printed by joulecast token create");
-  return input;
-}
+const auto session_input =
+    described::Input<std::string>("Start of a session")
+        .text("token", std::identity(), longest_text, "token as printed by joulecast token create");
 
 AccessEvent token_event(std::string action, const Token& token) {
-  ordered_json detail = token_table().document(token);
+  ordered_json detail = token_table.document(token);
   // Enough to distinguish two tokens of one name.
   detail["sha256_begins"] = token.sha256.substr(0, 16);
   return {.action = std::move(action), .detail_json = detail.dump()};
@@ -296,7 +288,7 @@ std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool se
 }
 
 Result<Response> Gate::sign_in(const Request& request) {
-  TRY_ASSIGN(const std::string secret, session_input().read(*request.json));
+  TRY_ASSIGN(const std::string secret, session_input.read(*request.json));
   if (!enabled())
     return fail(Fault::conflict, "/token", "this service has no tokens: signing in is not required");
   refresh();
@@ -327,7 +319,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
   record({token->name, request.address, request.id, here.operation_id,
           json_text(ordered_json{{"status", 200}})});
-  Response response = json_response(token_table().text(*token));
+  Response response = json_response(token_table.text(*token));
   response.headers.emplace_back("Set-Cookie", cookie(value, session_s, request.secure));
   return response;
 }
@@ -350,7 +342,7 @@ Result<Response> Gate::sign_out(const Request& request) {
 }
 
 described::Schemas session_schemas() {
-  return {{"session", token_table().schema()}, {"session-request", session_input().schema()}};
+  return {{"session", token_table.schema()}, {"session-request", session_input.schema()}};
 }
 
 std::vector<Endpoint> described_session_endpoints() {

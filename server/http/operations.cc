@@ -15,22 +15,16 @@ struct Version {
   std::string_view name = "joulecastd", version = JOULECAST_VERSION, compiler = "g++ " __VERSION__;
 };
 
-const Table<Ready>& readiness_table() {
-  static const auto table = Table<Ready>("Readiness")
-                                .value("status", [](const Ready&) { return "ready"; },
-                                       "always ready; otherwise the status is 503", {{"const", "ready"}})
-                                .texts("checks", std::identity(), "name of the check");
-  return table;
-}
+const auto readiness_table = Table<Ready>("Readiness")
+                                 .value("status", [](const Ready&) { return "ready"; },
+                                        "always ready; otherwise the status is 503", {{"const", "ready"}})
+                                 .texts("checks", std::identity(), "name of the check");
 
-const Table<Version>& version_table() {
-  static const auto table =
-      Table<Version>("Version of the service")
-          .value("name", &Version::name, "name of the program")
-          .value("version", &Version::version, "of the program", {{"pattern", R"(^[0-9]+\.[0-9]+\.[0-9]+)"}})
-          .value("compiler", &Version::compiler, "compiler of the program");
-  return table;
-}
+const auto version_table =
+    Table<Version>("Version of the service")
+        .value("name", AT(name), "name of the program")
+        .value("version", AT(version), "of the program", {{"pattern", R"(^[0-9]+\.[0-9]+\.[0-9]+)"}})
+        .value("compiler", AT(compiler), "compiler of the program");
 
 std::vector<std::string> refusal_names() {
   std::vector<std::string> names;
@@ -44,8 +38,8 @@ std::vector<std::string> refusal_names() {
 described::Schemas operations_schemas() {
   return {{"health", described::of_object("Liveness", {},
                                           {{"status", {{"const", "live"}, {"description", "always live"}}}})},
-          {"readiness", readiness_table().schema()},
-          {"version", version_table().schema()}};
+          {"readiness", readiness_table.schema()},
+          {"version", version_table.schema()}};
 }
 
 std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<ReadinessCheck> checks) {
@@ -80,7 +74,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
            names.push_back(name);
          }
          if (!failures.empty()) return fail(Fault::unavailable, "", "not ready: " + failures);
-         return json_response(readiness_table().text(names));
+         return json_response(readiness_table.text(names));
        }});
   add({.path = "/metrics",
        .operation_id = "getMetrics",
@@ -101,9 +95,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
        .response_schema = "version",
        .etag = true,
        .run = Run::io,
-       .handler = [](const Request&) -> Result<Response> {
-         return json_response(version_table().text({}));
-       }});
+       .handler = [](const Request&) -> Result<Response> { return json_response(version_table.text({})); }});
   return endpoints;
 }
 

@@ -35,28 +35,24 @@ struct Problem {
   std::optional<std::string_view> request_id = {}, field = {}, constraint = {};
 };
 
-const described::Table<Problem>& problem_table() {
-  using P = Problem;
-  static const auto table =
-      described::Table<P>("Problem document, RFC 9457")
-          .value("type", &P::type, "urn:joulecast:problem:<kind>")
-          .value("title", &P::title, "the status in words")
-          .value("status", &P::status, "status of the answer", {{"minimum", 400}, {"maximum", 599}})
-          .value("detail", &P::detail, "description of the error in this request")
-          .known("instance", &P::instance, "urn:joulecast:request:<request id>")
-          .known("request_id", &P::request_id, "the id under which the service logged the request")
-          .known("field", &P::field,
-                 "JSON pointer into the body (begins with /), or the name of a query or path parameter or of "
-                 "a header")
-          .known("constraint", &P::constraint, "the violated constraint, with value and bound")
-          .elsewhere("back_test", described::of_reference("back-test"), "back-test of a rejected adoption");
-  return table;
-}
+const auto problem_table =
+    described::Table<Problem>("Problem document, RFC 9457")
+        .value("type", AT(type), "urn:joulecast:problem:<kind>")
+        .value("title", AT(title), "the status in words")
+        .value("status", AT(status), "status of the answer", {{"minimum", 400}, {"maximum", 599}})
+        .value("detail", AT(detail), "description of the error in this request")
+        .known("instance", AT(instance), "urn:joulecast:request:<request id>")
+        .known("request_id", AT(request_id), "the id under which the service logged the request")
+        .known("field", AT(field),
+               "JSON pointer into the body (begins with /), or the name of a query or path parameter or of "
+               "a header")
+        .known("constraint", AT(constraint), "the violated constraint, with value and bound")
+        .elsewhere("back_test", described::of_reference("back-test"), "back-test of a rejected adoption");
 
 }  // namespace
 
 described::Schema problem_schema() {
-  return problem_table().schema();
+  return problem_table.schema();
 }
 
 unsigned status_of(Fault fault) {
@@ -87,7 +83,7 @@ Response problem(unsigned status, std::string_view slug, std::string_view detail
   response.status = status;
   response.content_type = "application/problem+json";
   // Messages can quote the client's input, which need not be UTF-8.
-  response.body = problem_table().document(document).dump();
+  response.body = problem_table.document(document).dump();
   if (status == 429 || status == 503) response.headers.emplace_back("Retry-After", "1");
   return response;
 }
