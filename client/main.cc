@@ -1,7 +1,5 @@
-#include <CLI/CLI.hpp>
-
+#include "client/commands/help.h"
 #include "client/commands/table.h"
-#include "client/program.h"
 
 int main(int argc, char** argv) {
   using namespace joulecast::client;

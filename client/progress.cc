@@ -1,12 +1,13 @@
 #include "client/progress.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+
+#include "client/wrapped.h"
 
 namespace joulecast::client {
 namespace {
@@ -18,15 +19,10 @@ std::string clock_text(double seconds) {
   return fmt::format("{}:{:02} h", whole / 3600, whole % 3600 / 60);
 }
 
-int terminal_width() {
-  winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
-}
-
 }  // namespace
 
 std::string progress_line(const std::string& work, const std::string& unit, std::uint64_t done,
-                          std::uint64_t total, double elapsed_s, int width) {
+                          std::uint64_t total, double elapsed_s, std::size_t width) {
   std::string line = work + ' ';
   if (total > 0) {
     const double part = std::min(1.0, static_cast<double>(done) / static_cast<double>(total));
@@ -40,8 +36,7 @@ std::string progress_line(const std::string& work, const std::string& unit, std:
     line += fmt::format("{} {}", done, unit);
     if (elapsed_s > 0) line += fmt::format(", {:.0f} a second", static_cast<double>(done) / elapsed_s);
   }
-  if (line.size() >= static_cast<std::size_t>(width))
-    line.resize(static_cast<std::size_t>(std::max(1, width - 1)));
+  if (line.size() >= width) line.resize(std::max<std::size_t>(width, 2) - 1);
   return line;
 }
 
@@ -59,7 +54,8 @@ void Progress::draw_if_due() {
   due_ = now + std::chrono::milliseconds(100);
   drawn_ = true;
   const double elapsed_s = std::chrono::duration<double>(now - begin_).count();
-  const auto line = progress_line(work_, unit_, done_, total_, elapsed_s, terminal_width());
+  const auto line =
+      progress_line(work_, unit_, done_, total_, elapsed_s, terminal_columns(STDERR_FILENO, 80));
   std::fprintf(stderr, "\r\033[K%s", line.c_str());
   std::fflush(stderr);
 }

@@ -51,6 +51,6 @@ class Progress : boost::noncopyable {
 // The line's text for a terminal of `width` columns, without control characters: a bar if `total` is not 0,
 // the rate, and the remaining time once it can be estimated.
 [[nodiscard]] std::string progress_line(const std::string& work, const std::string& unit, std::uint64_t done,
-                                        std::uint64_t total, double elapsed_s, int width);
+                                        std::uint64_t total, double elapsed_s, std::size_t width);
 
 }  // namespace joulecast::client

@@ -7,11 +7,14 @@
 
 namespace joulecast::client {
 
+std::size_t terminal_columns(int file, std::size_t otherwise) {
+  winsize size{};
+  return ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : otherwise;
+}
+
 std::size_t help_width() {
   constexpr std::size_t least = 60, most = 100;
-  winsize size{};
-  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return most;
-  return std::clamp<std::size_t>(size.ws_col, least, most);
+  return std::clamp(terminal_columns(STDOUT_FILENO, most), least, most);
 }
 
 std::string wrapped(std::string_view text, std::size_t width, std::size_t indent) {

@@ -6,7 +6,9 @@
 
 namespace joulecast::client {
 
-// Columns of the terminal that standard output is, 60 to 100; 100 where it is none, for equal files.
+// Columns of the terminal that `file` is, a descriptor; `otherwise` where it is none.
+[[nodiscard]] std::size_t terminal_columns(int file, std::size_t otherwise);
+// Those of standard output, 60 to 100; 100 where it is no terminal, for equal files.
 [[nodiscard]] std::size_t help_width();
 
 // `text` in lines of at most `width` columns, each but the first indented by `indent` blanks. Line breaks of

@@ -138,7 +138,7 @@ std::vector<Error> faults_of(const DaemonOptions& options) {
     if (!result) faults.push_back(result.error());
   };
   check(check_exposure(options));
-  check(http::TrustedProxies::parse(options.http.trusted_proxies));
+  check(http::parse_proxies(options.http.trusted_proxies));
   check(http::Gate::open({.token_file = options.token_file}));
   if (options.http.tls.given()) check(http::check_tls(options.http.tls));
   if (const Result<void> sound = history::check_store_url(store_url(options)); !sound)

@@ -51,8 +51,8 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     const auto model = services_.models.find(snapshot->robot_id);
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = services_.forecasts.reach(model, *snapshot);
-    hub_.publish_newest("state", rounded(api::state_table().text({*snapshot, reach, now_utime_us})),
-                        snapshot->robot_id);
+    hub_.publish("state", rounded(api::state_table().text({*snapshot, reach, now_utime_us})),
+                 snapshot->robot_id, http::EventHub::Of::state);
     published.snapshot = snapshot;
     published.live = live;
   }

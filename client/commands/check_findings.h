@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "client/commands/outcome.h"
+#include "client/commands/option.h"
 #include "plausibility/check.h"
 #include "robot/robot_model.h"
 #include "telemetry/channel_watch.h"

@@ -1,5 +1,3 @@
-#include "client/commands/completion.h"
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>

@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "client/commands/option.h"
+
 namespace joulecast::client {
 
 // Help with lines that fit the terminal, names of the options' values, and defaults after the meanings.
@@ -29,5 +31,13 @@ class HelpFormatter : public CLI::Formatter {
 
 // The message for an invalid command line, with a suggestion, in lines that end with a newline.
 [[nodiscard]] std::string wrong_use(const CLI::App& program, const CLI::ParseError& error);
+
+// Sets up the features of every command-line program: help that fits the terminal, --version (which prints
+// `version`), exit codes. Subcommands are added afterwards, since they inherit the format of the help.
+void prepare(CLI::App& program, const std::string& version);
+
+// Parses the command line, which runs the chosen subcommand, and returns the exit code; `exit` is where the
+// subcommands leave theirs.
+int run(CLI::App& program, int argc, char** argv, const Exit& exit);
 
 }  // namespace joulecast::client

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -13,6 +12,7 @@
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
+#include "client/wrapped.h"
 #include "telemetry/log_recordings.h"
 
 namespace joulecast::client {
@@ -68,21 +68,17 @@ std::string page(const std::string& lcm_url, const Listened& listened, std::int6
   return text;
 }
 
-std::size_t spy_width() {
-  winsize size{};
-  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 10'000;
-}
-
 Result<Exit> run_spy(SpyOptions& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.json;
   // Without a terminal no live display is needed; ten seconds are enough for a summary.
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
   auto redraw = [&](const Listened& listened) {
     if (!terminal) return;
-    std::fputs(
-        ("\033[H\033[J" + page(options.lcm_url, listened, host_utime_us(), spy_width()) + "ctrl-C ends\n")
-            .c_str(),
-        stdout);
+    std::fputs(("\033[H\033[J" +
+                page(options.lcm_url, listened, host_utime_us(), terminal_columns(STDOUT_FILENO, 10'000)) +
+                "ctrl-C ends\n")
+                   .c_str(),
+               stdout);
     std::fflush(stdout);
   };
   if (!terminal) std::fprintf(stderr, "listening on %s\n", options.lcm_url.c_str());
@@ -91,7 +87,9 @@ Result<Exit> run_spy(SpyOptions& options) {
   if (options.json)
     print_json(to_json(listened));
   else if (!terminal)
-    std::fputs(page(options.lcm_url, listened, host_utime_us(), spy_width()).c_str(), stdout);
+    std::fputs(
+        page(options.lcm_url, listened, host_utime_us(), terminal_columns(STDOUT_FILENO, 10'000)).c_str(),
+        stdout);
   return Exit::ok;
 }
 

@@ -1,10 +1,6 @@
 #pragma once
 
-#include "client/commands/outcome.h"
-
-namespace CLI {
-class App;
-}
+#include "client/commands/option.h"
 
 namespace joulecast::client {
 
@@ -27,6 +23,15 @@ inline void add_commands(CLI::App& program, Exit& exit) {
   FOR_EACH_COMMAND(ADD_COMMAND)
 #undef ADD_COMMAND
 }
+
+struct Candidate {
+  std::string text;  // ends in '/' or '=' where more is to follow
+  std::string meaning;
+};
+
+// Completions of the last of `words`, which are a command line without the program's name, in the order of
+// the help. Files are those of the working directory; ids of robots come from its server.
+[[nodiscard]] std::vector<Candidate> candidates(CLI::App& program, const std::vector<std::string>& words);
 
 // Subcommands of export.
 void add_export_rmf(CLI::App& group, Exit& exit);

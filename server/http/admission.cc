@@ -117,22 +117,19 @@ Result<net::ip::address> address_of(const std::string& text, const char* setting
   return address;
 }
 
-Result<TrustedProxies> TrustedProxies::parse(const std::vector<std::string>& addresses) {
+Result<TrustedProxies> parse_proxies(const std::vector<std::string>& addresses) {
   TrustedProxies proxies;
   for (const std::string& text : addresses) {
     TRY_ASSIGN(const auto address, address_of(text, "http.trusted_proxies"));
-    proxies.addresses_.push_back(unmapped(address));
+    proxies.insert(unmapped(address));
   }
   return proxies;
 }
 
-bool TrustedProxies::contains(const net::ip::address& address) const {
-  return std::ranges::find(addresses_, address) != addresses_.end();
-}
-
-net::ip::address TrustedProxies::client_of(net::ip::address connection, const Request& request) const {
+net::ip::address client_of(net::ip::address connection, const TrustedProxies& proxies,
+                           const Request& request) {
   connection = unmapped(connection);
-  if (!contains(connection)) return connection;
+  if (!proxies.contains(connection)) return connection;
   std::vector<std::string_view> named;  // each proxy adds its peer
   for (const auto& [name, value] : request.headers)
     if (equals_ignoring_case(name, "x-forwarded-for")) named.push_back(value);
@@ -145,7 +142,7 @@ net::ip::address TrustedProxies::client_of(net::ip::address connection, const Re
       const auto address = net::ip::make_address(std::string(trimmed(line.substr(begin))), error);
       if (error) return client;
       client = unmapped(address);
-      if (!contains(client)) return client;
+      if (!proxies.contains(client)) return client;
       line = line.substr(0, comma == std::string_view::npos ? 0 : comma);
     }
   }

@@ -5,6 +5,7 @@
 // asio.h stays first.
 #include <boost/asio/ip/address.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -43,20 +44,15 @@ class Admission {
 };
 
 // Proxies that are trusted to report their clients.
-class TrustedProxies {
- public:
-  // IP addresses; the error names http.trusted_proxies.
-  static Result<TrustedProxies> parse(const std::vector<std::string>& addresses);
+using TrustedProxies = std::set<boost::asio::ip::address>;
 
-  bool contains(const boost::asio::ip::address& address) const;
+// From IP addresses; the error names http.trusted_proxies.
+Result<TrustedProxies> parse_proxies(const std::vector<std::string>& addresses);
 
-  // The client behind that peer address of a connection: if it is a trusted proxy, the last address of
-  // X-Forwarded-For that is no trusted proxy. An entry that is no address ends the search at the last proxy.
-  boost::asio::ip::address client_of(boost::asio::ip::address connection, const Request& request) const;
-
- private:
-  std::vector<boost::asio::ip::address> addresses_;
-};
+// The client behind that peer address of a connection: if it is a trusted proxy, the last address of
+// X-Forwarded-For that is no trusted proxy. An entry that is no address ends the search at the last proxy.
+boost::asio::ip::address client_of(boost::asio::ip::address connection, const TrustedProxies& proxies,
+                                   const Request& request);
 
 Result<boost::asio::ip::address> address_of(const std::string& text, const char* setting);
 // As itself where it is an IPv4 address mapped into IPv6.

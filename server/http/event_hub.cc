@@ -136,21 +136,12 @@ EventHub::~EventHub() {
     if (const auto subscriber = each.lock()) subscriber->finish();
 }
 
-void EventHub::publish(std::string_view event, std::string_view data, std::string_view topic) {
-  send(event, data, topic, {});
-}
-
-void EventHub::publish_newest(std::string_view event, std::string_view data, std::string_view topic) {
-  send(event, data, topic, std::string(event).append(" ").append(topic));
-}
-
-void EventHub::send(std::string_view event, std::string_view data, std::string_view topic,
-                    std::string replaces) {
+void EventHub::publish(std::string_view event, std::string_view data, std::string_view topic, Of of) {
   const std::lock_guard lock(mutex_);
   auto entry = std::make_shared<Event>();
   entry->number = next_number_++;
   entry->topic = topic;
-  entry->replaces = std::move(replaces);
+  if (of == Of::state) entry->replaces.append(event).append(" ").append(topic);
   append_line(entry->text, "event", event);
   append_line(entry->text, "id", epoch_ + "-" + std::to_string(entry->number));
   append_line(entry->text, "data", data);

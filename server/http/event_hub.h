@@ -38,10 +38,10 @@ class EventHub {
   ~EventHub();
 
   // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
-  // select (a robot's id; empty goes to all).
-  void publish(std::string_view event, std::string_view data, std::string_view topic = {});
-  // The same, of events that outdate earlier ones of their topic: a slow client gets the newest alone.
-  void publish_newest(std::string_view event, std::string_view data, std::string_view topic);
+  // select (a robot's id; empty goes to all). Of states a slow client gets the topic's newest alone.
+  enum class Of : std::uint8_t { occurrence, state };
+  void publish(std::string_view event, std::string_view data, std::string_view topic = {},
+               Of of = Of::occurrence);
 
   // An event stream of one client; an empty topic selects everything. Beyond max_subscribers the oldest of
   // the client that has most of them ends; Fault::unavailable where that is this one, and beyond its quarter
@@ -58,7 +58,6 @@ class EventHub {
   struct Event;
   struct Subscriber;
 
-  void send(std::string_view event, std::string_view data, std::string_view topic, std::string replaces);
   // For another stream of that client, see subscribe().
   bool make_room(const std::string& client);
   std::size_t count_living() const;

@@ -78,7 +78,7 @@ struct HttpServer::Impl {
 
 Result<void> HttpServer::Impl::open() {
   TRY_ASSIGN(const auto address, address_of(core->options.address, "http.address"));
-  TRY_ASSIGN(core->proxies, TrustedProxies::parse(core->options.trusted_proxies));
+  TRY_ASSIGN(core->proxies, parse_proxies(core->options.trusted_proxies));
   if (core->options.tls.given()) {
     TRY_ASSIGN(core->tls, make_tls(core->options.tls));
   }

@@ -13,7 +13,6 @@
 #include "server/http/gate.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
-#include "server/http/uri.h"
 
 namespace joulecast::http {
 namespace {

@@ -15,7 +15,6 @@
 #include "server/http/delivery.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
-#include "server/http/uri.h"
 
 namespace joulecast::http {
 namespace {

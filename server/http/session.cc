@@ -293,7 +293,7 @@ void Session::fill_request() {
   request_.target = view(message.target());
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
-  const net::ip::address client = core_->proxies.client_of(caller_.address, request_);
+  const net::ip::address client = client_of(caller_.address, core_->proxies, request_);
   request_.address = client.to_string();
   request_.secure = core_->tls != nullptr || (core_->proxies.contains(caller_.address) &&
                                               request_.header("x-forwarded-proto") == "https");

@@ -4,8 +4,10 @@
 #include <charconv>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "base/error.h"
 #include "base/text.h"
 
 // Small pieces of text work shared by the HTTP frame and the settings.
@@ -63,5 +65,14 @@ void round_numbers(std::string& json, int digits);
 
 // The same of one number written in decimals.
 std::string rounded_number(std::string_view number, int digits);
+
+struct Target {
+  std::vector<std::string> segments;  // of the path, decoded one by one: "%2F" stays inside its segment
+  std::vector<std::pair<std::string, std::string>> query;
+};
+
+// Splits the origin form "/a/b?x=1" of a request target; a fragment is an error, like a repeated query key.
+// The absolute form is accepted, its authority ignored. Errors name the offending key or segment.
+Result<Target> parse_target(std::string_view target);
 
 }  // namespace joulecast::http

@@ -11,7 +11,6 @@
 #include <memory>
 #include <sstream>
 
-#include "client/commands/completion.h"
 #include "client/commands/help.h"
 #include "client/commands/option.h"
 #include "client/commands/table.h"

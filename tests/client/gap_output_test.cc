@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "client/commands/outcome.h"
+#include "client/commands/option.h"
 #include "client/commands/print.h"
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/diagnosis_json.h"

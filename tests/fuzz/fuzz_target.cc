@@ -1,6 +1,6 @@
 #include "base/text.h"
 #include "fuzz.h"
-#include "server/http/uri.h"
+#include "server/http/text.h"
 
 using namespace joulecast;
 

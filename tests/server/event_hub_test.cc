@@ -96,7 +96,7 @@ TEST(EventHub, SlowClientsGetNewestState) {
   EventHub hub({.queue_bytes = 1000});
   const auto slow = hub.subscribe().value();
   for (int i = 0; i < 500; ++i) {
-    for (const char* robot : {"a", "b"}) hub.publish_newest("state", std::to_string(i), robot);
+    for (const char* robot : {"a", "b"}) hub.publish("state", std::to_string(i), robot, EventHub::Of::state);
     if (i == 100) hub.publish("mission", "ended", "a");
   }
   EXPECT_EQ(hub.counts().dropped_clients, 0U);
@@ -107,7 +107,7 @@ TEST(EventHub, SlowClientsGetNewestState) {
   EXPECT_LT(of_mission, first);
   EXPECT_EQ(text.find("event: state\n", second + 1), std::string::npos) << text;
   EXPECT_NE(text.find("data: 499\n", second), std::string::npos);
-  hub.publish_newest("state", "500", "a");
+  hub.publish("state", "500", "a", EventHub::Of::state);
   EXPECT_NE(drain(*slow).find("data: 500\n"), std::string::npos);
 }
 

@@ -6,7 +6,7 @@
 
 #include "base/json_text.h"
 #include "server/http/problem.h"
-#include "server/http/uri.h"
+#include "server/http/text.h"
 
 namespace joulecast::http {
 namespace {

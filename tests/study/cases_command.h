@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <string>
 
-#include "client/commands/outcome.h"
+#include "client/commands/option.h"
 
 namespace joulecast::client {
 

@@ -2,7 +2,7 @@
 // operation.
 #include <CLI/CLI.hpp>
 
-#include "client/program.h"
+#include "client/commands/help.h"
 #include "tests/study/study_commands.h"
 
 int main(int argc, char** argv) {

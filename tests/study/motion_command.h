@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "client/commands/outcome.h"
+#include "client/commands/option.h"
 
 namespace joulecast::client {
 

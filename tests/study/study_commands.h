@@ -1,6 +1,6 @@
 #pragma once
 
-#include "client/commands/outcome.h"
+#include "client/commands/option.h"
 
 namespace CLI {
 class App;
