@@ -30,7 +30,6 @@
 #include "client/interrupt.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/truth.h"
 #include "signals/ids.h"
 #include "signals/sample.h"
 #include "telemetry/codec.h"

@@ -44,13 +44,16 @@ struct SensorSuite {
   bool noise = true;              // false: systematic errors only
 };
 
-// The quantities as they are, before any sensor.
-struct Reading {
-  std::array<double, 2> wheel_speed_rad_s{};
+struct Electrical {
   std::array<double, 2> motor_voltage_v{};
   std::array<double, 2> motor_current_a{};
   double battery_voltage_v = 0;
   double battery_current_a = 0;
+};
+
+// The quantities as they are, before any sensor.
+struct Reading : Electrical {
+  std::array<double, 2> wheel_speed_rad_s{};
   std::array<double, 2> command{};
   double yaw_rate_rad_s = 0;
   double pitch_rad = 0;

@@ -2,9 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace joulecast::virtual_robot {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(World, slope_direction_rad, weak_side, stribeck_speed_m_s, stribeck_power,
+                                   bristle_rad, brush_softness, motor_sensor_share, battery_sensor_share,
+                                   emf_loss_share, thermal_time_constant_s, period_s, burst_time_s, patch_m)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(MissionTruth, mission_id, payload_kg, undeclared_kg, duration_s,
+                                   distance_m, battery_energy_j)
+
 namespace {
 
 enum Stream : std::uint64_t { missions_stream, scatter_stream, sensors_stream, computer_stream };
@@ -146,14 +155,14 @@ void VirtualRobot::run_charger() {
   ++period_;
 }
 
-VirtualRobot::Electrical VirtualRobot::electrical() const {
+Electrical VirtualRobot::electrical() const {
   const auto battery = pack_.terminals(battery_power_w());
   return {voltage_v_, plant_.state().current_a, battery.voltage_v, battery.current_a};
 }
 
 // History holds the beginnings of past control periods; motor voltage is held from there on, the rest is
 // nearly straight to the next.
-VirtualRobot::Electrical VirtualRobot::delayed(double delay_s) const {
+Electrical VirtualRobot::delayed(double delay_s) const {
   const double now = static_cast<double>(step_) / steps_per_period_;  // in control periods
   const double at = std::max(0.0, now - delay_s / SpeedController::period_s);
   const auto index = static_cast<std::int64_t>(at);
@@ -174,14 +183,9 @@ VirtualRobot::Electrical VirtualRobot::delayed(double delay_s) const {
 
 Reading VirtualRobot::reading() const {
   const double delay_s = spec_.imperfections.sensor_delay + spec_.latency_s;
-  const Electrical e = delay_s > 0 ? delayed(delay_s) : electrical();
   const PlantState& s = plant_.state();
-  Reading r;
+  Reading r{delay_s > 0 ? delayed(delay_s) : electrical()};
   r.wheel_speed_rad_s = s.wheel_speed_rad_s;
-  r.motor_voltage_v = e.motor_voltage_v;
-  r.motor_current_a = e.motor_current_a;
-  r.battery_voltage_v = e.battery_voltage_v;
-  r.battery_current_a = e.battery_current_a;
   r.command = {command_.speed_m_s, command_.yaw_rate_rad_s};
   r.yaw_rate_rad_s = plant_.yaw_rate_rad_s();
   r.pitch_rad = plant_.climb_rad();
@@ -221,8 +225,7 @@ void VirtualRobot::wander_load() {
 
 void VirtualRobot::take_sample() {
   const Reading truth = reading();
-  witness_ = {sensors_.systematic(truth), plant_.wheel_acceleration_rad_s2(voltage_v_),
-              truth.declared_payload_kg};
+  witness_ = {sensors_.systematic(truth), plant_.wheel_acceleration_rad_s2(voltage_v_)};
   signals::Sample sample = sensors_.sample(truth);
   sample.utime_us = now_us();
   sample.sequence = sample_index_;
@@ -293,6 +296,37 @@ void VirtualRobot::run_period() {
   mission_.distance_m += std::abs(plant_.speed_m_s()) * SpeedController::period_s;
   mission_.battery_energy_j += battery_w * SpeedController::period_s;
   ++period_;
+}
+
+std::string truth_json(const std::vector<Truth>& truths) {
+  using Json = nlohmann::json;
+  Json robots = Json::array();
+  for (const Truth& truth : truths) {
+    Json missions = Json::array();
+    for (const MissionTruth& m : truth.missions) {
+      const PlantAccounts& a = m.accounts;
+      missions.push_back(m);
+      missions.back().update({{"motor_energy_j", a.motor},
+                              {"driver_energy_j", a.bus},
+                              {"copper_j", a.copper},
+                              {"brush_j", a.brush},
+                              {"internal_friction_j", a.internal},
+                              {"floor_friction_j", a.floor},
+                              {"gear_j", a.gear},
+                              {"drag_j", a.drag},
+                              {"scrub_j", a.scrub},
+                              {"slip_j", a.slip},
+                              {"potential_j", a.potential}});
+    }
+    Json world = truth.world;
+    world["zone"] = {truth.world.zone_x_m, truth.world.zone_y_m, truth.world.zone_radius_m};
+    robots.push_back({{"robot_id", truth.robot_id},
+                      {"seed", truth.seed},
+                      {"effects", std::map(truth.effects.begin(), truth.effects.end())},
+                      {"world", world},
+                      {"missions", missions}});
+  }
+  return Json{{"robots", robots}}.dump(2) + "\n";
 }
 
 }  // namespace joulecast::virtual_robot

@@ -70,7 +70,6 @@ struct Emission {
 struct Witness {
   Reading reading;
   std::array<double, 2> wheel_acceleration_rad_s2{};
-  double payload_kg = 0;  // declared
 };
 
 // One robot at work: pilot, controller, plant, battery and sensors on one clock. Each call runs to its next
@@ -91,13 +90,6 @@ class VirtualRobot {
 
  private:
   static constexpr std::size_t history_length = 128;  // control periods; longer than any sensor delay
-
-  struct Electrical {
-    std::array<double, 2> motor_voltage_v{};
-    std::array<double, 2> motor_current_a{};
-    double battery_voltage_v = 0;
-    double battery_current_a = 0;
-  };
 
   void run_period();
   void start_mission();
@@ -148,5 +140,16 @@ class VirtualRobot {
   bool charging_ = false;  // at the charger
   double rested_s_ = 0;    // there, after it has ended
 };
+
+struct Truth {
+  std::string robot_id;
+  std::uint64_t seed = 0;
+  std::vector<EffectStrength> effects;
+  World world;
+  std::vector<MissionTruth> missions;
+};
+
+// The injected truth as JSON: per robot its effects, the world's shapes, and true energies per mission [J].
+[[nodiscard]] std::string truth_json(const std::vector<Truth>& truths);
 
 }  // namespace joulecast::virtual_robot

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "client/virtual_robot/truth.h"
+#include "client/virtual_robot/virtual_robot.h"
 #include "signals/sample.h"
 
 namespace joulecast::virtual_robot {
@@ -98,7 +98,7 @@ inline GapIntegrals integrate(const SimulationSpec& spec, std::uint64_t seed) {
     const Witness& seen = robot.witness();
     const double measured = seen.reading.battery_voltage_v * seen.reading.battery_current_a;
     const double nominal = nominal_power_w(spec.robot, seen.reading.wheel_speed_rad_s,
-                                           seen.wheel_acceleration_rad_s2, seen.payload_kg);
+                                           seen.wheel_acceleration_rad_s2, seen.reading.declared_payload_kg);
     sums.absolute += std::abs(measured - nominal);
     sums.measured += std::abs(measured);
     sums.measured_signed += measured;
