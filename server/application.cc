@@ -236,7 +236,7 @@ struct Application::Parts {
     if (options.webhooks_file.empty()) return {};
     TRY_ASSIGN(auto read, server::read_webhooks(options.webhooks_file));
     webhooks = std::make_unique<server::Webhooks>(std::move(read), options.webhooks);
-    server::export_webhook_metrics(metrics, *webhooks);
+    metrics.series([this] { return server::webhook_series(*webhooks); });
     return {};
   }
 
@@ -299,7 +299,7 @@ struct Application::Parts {
                    {"dialect", answers::dialect_names[static_cast<std::size_t>(options.mqtt.dialect)]}}] {
           return live_batteries(request);
         });
-    server::export_mqtt_metrics(metrics, *batteries);
+    metrics.series([this] { return server::mqtt_series(*batteries); });
     return batteries->start();
   }
 
@@ -375,16 +375,23 @@ struct Application::Parts {
 
   void export_all_metrics() {
     sizes = std::make_unique<server::StoreSizes>(*store);
-    server::export_metrics(metrics, counters, *ingest, fleet, *writer, *sizes, events, host_utime_us);
-    server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
-    server::export_attention_metrics(metrics, *attention);
-    if (cluster) server::export_cluster_metrics(metrics, *cluster);
-    server::export_process_metrics(metrics);
-    metrics.series([this]() -> std::vector<Metrics::Series> {
+    metrics.series([this] { return server::message_series(counters, *ingest); });
+    metrics.series([this] { return server::mission_series(counters); });
+    metrics.series([this] { return server::fleet_series(fleet, host_utime_us()); });
+    metrics.series([this] { return server::writer_series(*writer); });
+    // joulecast_store_healthy reports a store whose sizes cannot be read.
+    metrics.series([this] { return server::store_series(sizes->read()); });
+    metrics.series([this] { return server::stream_series(events); });
+    metrics.series([this] { return server::gap_series(*diagnoses, *watch, *adoption); });
+    metrics.series([this] { return server::attention_series(*attention); });
+    if (cluster) metrics.series([this] { return server::cluster_series(*cluster); });
+    metrics.series(server::process_series);
+    metrics.series([this]() -> server::AllSeries {
       return {{"joulecast_robot_files_faulty", "Faulty robot files that were skipped at the start",
                faulty_files}};
     });
-    server::export_robot_metrics(metrics, fleet, *watch, host_utime_us, options.robots_with_metrics);
+    metrics.series(
+        [this] { return server::robot_series(fleet, *watch, host_utime_us(), options.robots_with_metrics); });
   }
 
   // NaN for 0, which is the value of a setting that is not set.
@@ -439,11 +446,11 @@ struct Application::Parts {
 
   // Reports exceptions that a thread survived as a log line, a count and an entry of the event log.
   void tell_of_faults() {
-    const Counter survived =
+    prometheus::Counter& survived =
         metrics.counter("joulecast_internal_faults_total",
                         "Exceptions that a thread survived: each cost one message, one commit or one job");
-    observe_faults([survived, &writer = *writer](std::string_view part, std::string_view why) {
-      survived.add(1);
+    observe_faults([&survived, &writer = *writer](std::string_view part, std::string_view why) {
+      survived.Increment();
       log_error("internal fault", Error{Fault::internal, std::string(part), std::string(why)});
       JsonWriter detail;
       detail.begin_object().field("part", part).field("why", why).end_object();

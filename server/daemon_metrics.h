@@ -2,8 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <future>
+#include <vector>
 
 #include "history/store.h"
 #include "history/writer.h"
@@ -36,35 +36,30 @@ class StoreSizes {
   history::StoreSize last_;
 };
 
-// Exports the counters of the parts, refreshed at each scrape. The parts must outlive `metrics`.
-void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
-                    const ingest::IngestService& ingest, const ingest::FleetView& fleet,
-                    const history::Writer& writer, StoreSizes& sizes, const http::EventHub& events,
-                    std::function<std::int64_t()> now_utime_us);
-
-// joulecast_cluster_*: this daemon's part in its cluster.
-void export_cluster_metrics(Metrics& metrics, const Cluster& cluster);
-
-// Exports the counters of diagnoses, the watch of the gap and adoptions, refreshed at each scrape.
-void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, const GapWatch& watch,
-                        const ModelAdoption& adoption);
-
-// Exports the number of entries of the attention list that are not acknowledged, by severity.
-void export_attention_metrics(Metrics& metrics, const api::AttentionList& list);
-
-// joulecast_mqtt_*. Both must outlive the metrics.
-void export_mqtt_metrics(Metrics& metrics, const BatteryTopics& topics);
+// The metrics of the parts at a scrape.
+using AllSeries = std::vector<Metrics::Series>;
+AllSeries message_series(const ingest::IngestCounters& counters, const ingest::IngestService& ingest);
+AllSeries mission_series(const ingest::IngestCounters& counters);
+AllSeries fleet_series(const ingest::FleetView& fleet, std::int64_t now_utime_us);
+AllSeries writer_series(const history::Writer& writer);
+AllSeries store_series(const history::StoreSize& size);
+AllSeries stream_series(const http::EventHub& events);
+AllSeries gap_series(const DiagnosisService& diagnoses, const GapWatch& watch, const ModelAdoption& adoption);
+// The entries of the attention list that are not acknowledged, by severity.
+AllSeries attention_series(const api::AttentionList& list);
+// This daemon's part in its cluster.
+AllSeries cluster_series(const Cluster& cluster);
+AllSeries mqtt_series(const BatteryTopics& topics);
+// Of each webhook, by its number in the file and its host.
+AllSeries webhook_series(const Webhooks& webhooks);
 
 // The metrics process_*, Prometheus's convention for all programs, and joulecast_build_info.
-void export_process_metrics(Metrics& metrics);
+AllSeries process_series();
 
 // Metrics of each robot, of `most_robots` at most, the first by id; joulecast_robots_without_metrics counts
 // the others. Joules count missions since the daemon started. Terms of the ledger may fall, as kinetic energy
-// does, and are gauges; drawn and returned energy are counters. The parts must outlive `metrics`.
-void export_robot_metrics(Metrics& metrics, const ingest::FleetView& fleet, const GapWatch& watch,
-                          std::function<std::int64_t()> now_utime_us, std::size_t most_robots);
-
-// joulecast_webhook_*: of each webhook, by its number in the file and its host. Both outlive the metrics.
-void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks);
+// does, and are gauges; drawn and returned energy are counters.
+AllSeries robot_series(const ingest::FleetView& fleet, const GapWatch& watch, std::int64_t now_utime_us,
+                       std::size_t most_robots);
 
 }  // namespace joulecast::server

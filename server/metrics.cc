@@ -1,14 +1,10 @@
 #include "server/metrics.h"
 
-#include <prometheus/counter.h>
-#include <prometheus/histogram.h>
-#include <prometheus/registry.h>
 #include <prometheus/text_serializer.h>
 
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <mutex>
 
 namespace joulecast {
 namespace {
@@ -44,56 +40,36 @@ prometheus::MetricFamily family_of(const Metrics::Series& series) {
 
 }  // namespace
 
-void Counter::add(double amount) const {
-  if (counter_ != nullptr) counter_->Increment(amount);
-}
-
-void Histogram::observe(double value) const {
-  if (histogram_ != nullptr) histogram_->Observe(value);
-}
-
-struct Metrics::State {
-  prometheus::Registry registry;
-  mutable std::mutex mutex;
-  std::vector<std::function<std::vector<Series>()>> readers;
-};
-
-Metrics::Metrics() : state_(std::make_unique<State>()) {}
-Metrics::~Metrics() = default;
-
-Counter Metrics::counter(const std::string& name, const std::string& help, const Labels& labels) {
+prometheus::Counter& Metrics::counter(const std::string& name, const std::string& help,
+                                      const Labels& labels) {
   check_name(name, true);
-  return Counter(
-      &prometheus::BuildCounter().Name(name).Help(help).Register(state_->registry).Add(to_map(labels)));
+  return prometheus::BuildCounter().Name(name).Help(help).Register(registry_).Add(to_map(labels));
 }
 
-Histogram Metrics::histogram(const std::string& name, const std::string& help,
-                             const std::vector<double>& upper_bounds, const Labels& labels) {
+prometheus::Histogram& Metrics::histogram(const std::string& name, const std::string& help,
+                                          const std::vector<double>& upper_bounds, const Labels& labels) {
   check_name(name, false);
-  return Histogram(&prometheus::BuildHistogram()
-                        .Name(name)
-                        .Help(help)
-                        .Register(state_->registry)
-                        .Add(to_map(labels), upper_bounds));
+  return prometheus::BuildHistogram().Name(name).Help(help).Register(registry_).Add(to_map(labels),
+                                                                                    upper_bounds);
 }
 
-std::vector<Counter> Metrics::counters(const std::string& name, const std::string& help,
-                                       const std::string& label, const std::vector<std::string>& values) {
-  std::vector<Counter> made;
-  made.reserve(values.size());
-  for (const auto& value : values) made.push_back(counter(name, help, {{label, value}}));
+std::vector<prometheus::Counter*> Metrics::counters(const std::string& name, const std::string& help,
+                                                    const std::string& label,
+                                                    const std::vector<std::string>& values) {
+  std::vector<prometheus::Counter*> made;
+  for (const auto& value : values) made.push_back(&counter(name, help, {{label, value}}));
   return made;
 }
 
 void Metrics::series(std::function<std::vector<Series>()> read) {
-  const std::lock_guard lock(state_->mutex);
-  state_->readers.push_back(std::move(read));
+  const std::lock_guard lock(mutex_);
+  readers_.push_back(std::move(read));
 }
 
 std::string Metrics::text() const {
-  const std::lock_guard lock(state_->mutex);
-  std::vector<prometheus::MetricFamily> families = state_->registry.Collect();
-  for (const auto& read : state_->readers)
+  const std::lock_guard lock(mutex_);
+  std::vector<prometheus::MetricFamily> families = registry_.Collect();
+  for (const auto& read : readers_)
     for (const Series& series : read()) families.push_back(family_of(series));
   return prometheus::TextSerializer().Serialize(families);
 }

@@ -1,58 +1,33 @@
 #pragma once
 
+#include <prometheus/counter.h>
+#include <prometheus/histogram.h>
+#include <prometheus/registry.h>
+
 #include <functional>
-#include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-namespace prometheus {
-class Counter;
-class Histogram;
-}  // namespace prometheus
-
-// Prometheus metrics behind handles. Names are joulecast_<what>_<base unit>[_total]; a label's values are
-// fixed when the metric is made, so that no client can make their number grow. Handles are small, copyable,
-// usable from any thread, and valid as long as the Metrics they come from.
+// Prometheus metrics. Names are joulecast_<what>_<base unit>[_total]; a label's values are fixed when the
+// metric is made, so that no client can make their number grow. Counters and histograms are usable from any
+// thread, and valid as long as the Metrics they come from.
 namespace joulecast {
-
-class Counter {
- public:
-  Counter() = default;
-  void add(double amount = 1) const;
-
- private:
-  friend class Metrics;
-  explicit Counter(prometheus::Counter* counter) : counter_(counter) {}
-  prometheus::Counter* counter_ = nullptr;  // null: counts nothing
-};
-
-class Histogram {
- public:
-  Histogram() = default;
-  void observe(double value) const;
-
- private:
-  friend class Metrics;
-  explicit Histogram(prometheus::Histogram* histogram) : histogram_(histogram) {}
-  prometheus::Histogram* histogram_ = nullptr;
-};
 
 using Labels = std::vector<std::pair<std::string, std::string>>;
 
 class Metrics {
  public:
-  Metrics();
-  ~Metrics();
-
   // The same name and labels give the same metric. A name that violates the convention aborts.
-  Counter counter(const std::string& name, const std::string& help, const Labels& labels = {});
-  Histogram histogram(const std::string& name, const std::string& help,
-                      const std::vector<double>& upper_bounds, const Labels& labels = {});
+  prometheus::Counter& counter(const std::string& name, const std::string& help, const Labels& labels = {});
+  prometheus::Histogram& histogram(const std::string& name, const std::string& help,
+                                   const std::vector<double>& upper_bounds, const Labels& labels = {});
   // One counter for each value of a label, all present from the start at zero, in the order of the values.
-  std::vector<Counter> counters(const std::string& name, const std::string& help, const std::string& label,
-                                const std::vector<std::string>& values);
+  std::vector<prometheus::Counter*> counters(const std::string& name, const std::string& help,
+                                             const std::string& label,
+                                             const std::vector<std::string>& values);
 
   // Metrics that are read again before each text(): counters where the name ends in _total, otherwise gauges.
   // Values of labels that are left out disappear; the reader bounds their number and must be thread-safe.
@@ -79,8 +54,9 @@ class Metrics {
   static const std::vector<double>& request_seconds();
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  prometheus::Registry registry_;
+  mutable std::mutex mutex_;
+  std::vector<std::function<std::vector<Series>()>> readers_;
 };
 
 }  // namespace joulecast

@@ -138,17 +138,17 @@ void HttpMetrics::exchanged(const Exchange& exchange) {
   if (fresh) {
     const std::string operation(exchange.operation);
     place->second.requests =
-        metrics_.counter("joulecast_http_requests_total", "Requests answered",
-                         {{"operation", operation}, {"code", std::to_string(exchange.status)}});
+        &metrics_.counter("joulecast_http_requests_total", "Requests answered",
+                          {{"operation", operation}, {"code", std::to_string(exchange.status)}});
     place->second.duration =
-        metrics_.histogram("joulecast_http_request_duration_seconds",
-                           "From the last byte of a request to the last byte of its answer",
-                           Metrics::request_seconds(), {{"operation", operation}});
+        &metrics_.histogram("joulecast_http_request_duration_seconds",
+                            "From the last byte of a request to the last byte of its answer",
+                            Metrics::request_seconds(), {{"operation", operation}});
   }
-  place->second.requests.add();
-  if (!exchange.stream) place->second.duration.observe(exchange.duration_s);
-  sent_bytes_.add(static_cast<double>(exchange.response_bytes));
-  received_bytes_.add(static_cast<double>(exchange.request_bytes));
+  place->second.requests->Increment();
+  if (!exchange.stream) place->second.duration->Observe(exchange.duration_s);
+  sent_bytes_.Increment(static_cast<double>(exchange.response_bytes));
+  received_bytes_.Increment(static_cast<double>(exchange.request_bytes));
 }
 
 }  // namespace joulecast::http

@@ -40,19 +40,19 @@ class HttpMetrics : public ServerObserver {
   explicit HttpMetrics(Metrics& metrics);
 
   void exchanged(const Exchange& exchange) override;
-  void refused(Refusal refusal) override { refusals_[static_cast<std::size_t>(refusal)].add(); }
+  void refused(Refusal refusal) override { refusals_[static_cast<std::size_t>(refusal)]->Increment(); }
   void connections(std::size_t open) override { connections_ = open; }
 
  private:
   struct Series {
-    Counter requests;
-    Histogram duration;
+    prometheus::Counter* requests = nullptr;
+    prometheus::Histogram* duration = nullptr;
   };
   Metrics& metrics_;
   std::map<std::pair<const char*, unsigned>, Series> series_;  // by operation and status; I/O thread only
-  std::vector<Counter> refusals_;
-  Counter sent_bytes_;
-  Counter received_bytes_;
+  std::vector<prometheus::Counter*> refusals_;
+  prometheus::Counter& sent_bytes_;
+  prometheus::Counter& received_bytes_;
   std::atomic<std::size_t> connections_ = 0;
 };
 

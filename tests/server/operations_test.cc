@@ -71,11 +71,10 @@ TEST_F(OperationsTest, ReadyRequiresEveryCheck) {
 }
 
 TEST_F(OperationsTest, ShowsMetrics) {
-  const Counter counter = metrics_.counter("joulecast_test_total", "test", {{"reason", "a"}});
-  counter.add(5);
-  metrics_.histogram("joulecast_wait_seconds", "test", {0.1, 1}).observe(0.5);
+  metrics_.counter("joulecast_test_total", "test", {{"reason", "a"}}).Increment(5);
+  metrics_.histogram("joulecast_wait_seconds", "test", {0.1, 1}).Observe(0.5);
   const auto drops = metrics_.counters("joulecast_drops_total", "test", "reason", {"late", "duplicate"});
-  drops[1].add();
+  drops[1]->Increment();
   int refreshed = 0;
   metrics_.series([&] {
     return std::vector<Metrics::Series>{{"joulecast_refreshed", "test", ++refreshed},
