@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "answers/autonomy.h"
-#include "answers/mission.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "base/try.h"
@@ -42,7 +41,6 @@
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
-#include "server/http/text.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 
@@ -206,8 +204,7 @@ struct Application::Parts {
     };
     writing.on_mission_ended = [this](const history::Mission& mission) {
       survive("mission events", [&] {
-        std::string text = answers::mission_table().text(mission);
-        http::round_numbers(text, http::usual_digits);
+        const std::string text = server::mission_event(mission);
         events.publish("mission", text, mission.robot_id);
         if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, text);
       });

@@ -78,16 +78,13 @@ Result<server::ClusterOptions> cluster_options(const DaemonOptions& options) {
 
 Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options) {
   server::BatteryTopics::Options mqtt = options.mqtt;
-  TRY_ASSIGN(const server::BrokerOptions broker, server::parse_broker_url(options.mqtt_url, "mqtt.url"));
+  TRY(mqtt.broker.set_url(options.mqtt_url));
   for (const auto& [key, level] : {std::pair("mqtt.client_id", mqtt.broker.client_id),
                                    {"mqtt.interface", mqtt.interface},
                                    {"mqtt.manufacturer", mqtt.manufacturer}}) {
     if (level.empty() || level.find_first_of("/+#$") != std::string::npos)
       return invalid(key, "is a level of MQTT topics: not empty, and without /, +, # and $");
   }
-  mqtt.broker.host = broker.host;
-  mqtt.broker.port = broker.port;
-  mqtt.broker.tls = broker.tls;
   if (const std::string& file = options.mqtt_password_file; !file.empty()) {
     if (mqtt.broker.user.empty())
       return invalid("mqtt.password_file", "requires mqtt.user: MQTT has no password without a user name");

@@ -5,21 +5,17 @@
 #include "server/http/text.h"
 
 namespace joulecast::server {
-namespace {
 
-std::string rounded(std::string text) {
-  http::round_numbers(text, http::usual_digits);
-  return text;
+std::string mission_event(const history::Mission& mission) {
+  return http::rounded(answers::mission_table().text(mission));
 }
-
-}  // namespace
 
 void FleetEvents::publish_contradictions(const ingest::RobotSnapshot& now, Published& published) {
   for (const ingest::Contradiction& c : now.contradictions) {
     std::int64_t& last = published.contradictions[c.id + ' ' + c.channel];
     if (last == c.told_utime_us) continue;
     last = c.told_utime_us;
-    hub_.publish("contradiction", rounded(api::contradiction_event_table().text({now.robot_id, c})),
+    hub_.publish("contradiction", http::rounded(api::contradiction_event_table().text({now.robot_id, c})),
                  now.robot_id);
   }
 }
@@ -33,7 +29,7 @@ void FleetEvents::publish_ended(const ingest::RobotSnapshot& now, Published& pub
     const auto mission = services_.store.mission(key);
     if (!mission) return mission.error().fault == Fault::not_found;
     if (mission->state == history::MissionState::open) return false;
-    hub_.publish("mission", rounded(answers::mission_table().text(*mission)), now.robot_id);
+    hub_.publish("mission", mission_event(*mission), now.robot_id);
     return true;
   });
 }
@@ -51,7 +47,7 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     const auto model = services_.models.find(snapshot->robot_id);
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = services_.forecasts.reach(model, *snapshot);
-    hub_.publish("state", rounded(api::state_table().text({*snapshot, reach, now_utime_us})),
+    hub_.publish("state", http::rounded(api::state_table().text({*snapshot, reach, now_utime_us})),
                  snapshot->robot_id, http::EventHub::Of::state);
     published.snapshot = snapshot;
     published.live = live;

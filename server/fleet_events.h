@@ -13,6 +13,9 @@
 
 namespace joulecast::server {
 
+// The data of the event `mission` of one that has ended.
+std::string mission_event(const history::Mission& mission);
+
 // Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot,
 // `contradiction` for each published contradiction, `mission` for each mission that ended at another daemon
 // of the cluster. Keeps the last values of each robot. One thread.

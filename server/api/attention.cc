@@ -275,14 +275,9 @@ Result<Response> acknowledge(const Services& services, const Request& request) {
     return tl::unexpected(ingest::unknown_robot("id", robot_id));
   TRY_ASSIGN(const auto wanted, acknowledge_input.read(*request.json));
   RequestChange request_change(services, request);
-  const history::Outcome done = services.attention->acknowledge(
-      robot_id, std::string(kinds[wanted.kind].name), {services.now_utime_us(), request.actor, wanted.note},
-      [&](const AttentionEntry& entry, history::Learned learned) {
-        return services.writer.execute(request_change.answered_by(
-            [entry](std::int64_t) { return http::json_response(attention_entry_table.text(entry)); },
-            history::PutLearned{std::move(learned)}));
-      });
-  return request_change.result(done);
+  return request_change.result(
+      services.attention->acknowledge(robot_id, kinds[wanted.kind].name,
+                                      {services.now_utime_us(), request.actor, wanted.note}, request_change));
 }
 
 }  // namespace
@@ -312,8 +307,8 @@ std::vector<AttentionEntry> AttentionList::entries() const {
   return entries;
 }
 
-history::Outcome AttentionList::acknowledge(const std::string& robot_id, const std::string& kind,
-                                            const Acknowledgement& by, const Commit& commit) {
+history::Outcome AttentionList::acknowledge(const std::string& robot_id, std::string_view kind,
+                                            const Acknowledgement& by, RequestChange& change) {
   const std::lock_guard changing(changing_);
   AttentionEntry entry{robot_id, {}};
   {
@@ -326,9 +321,13 @@ history::Outcome AttentionList::acknowledge(const std::string& robot_id, const s
     reason.acknowledged = by;
     any = true;
   }
-  if (!any) return fail(Fault::not_found, "kind", "robot " + robot_id + " has no reason of kind " + kind);
+  if (!any)
+    return fail(Fault::not_found, "kind",
+                "robot " + robot_id + " has no reason of kind " + std::string(kind));
   std::ranges::stable_sort(entry.reasons, {}, urgency);
-  const history::Outcome done = commit(entry, {robot_id, topic, by.utime_us, reasons_json(entry.reasons)});
+  const history::Outcome done = services_.writer.execute(change.answered_by(
+      [entry](std::int64_t) { return http::json_response(attention_entry_table.text(entry)); },
+      history::PutLearned{{robot_id, topic, by.utime_us, reasons_json(entry.reasons)}}));
   if (!done) return done;
   const std::lock_guard lock(mutex_);
   shown_[robot_id] = std::move(entry.reasons);

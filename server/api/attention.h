@@ -17,6 +17,7 @@
 
 namespace joulecast::api {
 
+class RequestChange;
 struct Services;
 
 // The most urgent first: data are wrong or missing; a robot or a model needs a person; information.
@@ -70,11 +71,10 @@ class AttentionList {
   // Unacknowledged ones first, then the most urgent, then by robot id.
   std::vector<AttentionEntry> entries() const;
 
-  // Acknowledges the robot's reasons of the kind until they end. `commit` stores what it is given and returns
-  // the outcome. Fault::not_found of "kind" if the robot has no such reason.
-  using Commit = std::function<history::Outcome(const AttentionEntry& entry, history::Learned learned)>;
-  history::Outcome acknowledge(const std::string& robot_id, const std::string& kind,
-                               const Acknowledgement& by, const Commit& commit);
+  // Acknowledges the robot's reasons of the kind until they end, by `change`, which is answered with its
+  // entry. Fault::not_found of "kind" if the robot has no such reason.
+  history::Outcome acknowledge(const std::string& robot_id, std::string_view kind, const Acknowledgement& by,
+                               RequestChange& change);
 
  private:
   using Reasons = std::map<std::string, std::vector<AttentionReason>>;  // by robot; of the service: ""

@@ -61,7 +61,7 @@ Csv& Csv::exact(double number) {
 
 Csv& Csv::field(double number) {
   separate();
-  if (std::isfinite(number)) text_ += http::rounded_number(http::number_text(resolved(number)), digits_);
+  if (std::isfinite(number)) text_ += http::rounded(http::number_text(resolved(number)), digits_);
   return *this;
 }
 

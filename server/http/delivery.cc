@@ -34,7 +34,7 @@ std::string& own_body(Response& response) {
 
 void round(const Request& request, Response& response) {
   const auto digits = static_cast<int>(request.query_integer("digits").value_or(usual_digits));
-  if (digits < all_digits) round_numbers(own_body(response), digits);
+  if (digits < all_digits) response.body = rounded(std::move(own_body(response)), digits);
 }
 
 // True when the client has it.

@@ -317,8 +317,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   }
   const std::string value = access::random_hex(32);
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
-  record({token->name, request.address, request.id, here.operation_id,
-          json_text(ordered_json{{"status", 200}})});
+  record({token->name, request.address, request.id, here.operation_id, audited_status(200)});
   Response response = json_response(token_table.text(*token));
   response.headers.emplace_back("Set-Cookie", cookie(value, session_s, request.secure));
   return response;
@@ -331,8 +330,7 @@ Result<Response> Gate::sign_out(const Request& request) {
     const Token* token = token_of(request, presented);
     const std::string value = access::sha256_hex(cookie_value(request.header("cookie"), session_cookie));
     if (sessions_.erase(value) > 0 && token != nullptr)
-      record({token->name, request.address, request.id, "deleteSession",
-              json_text(ordered_json{{"status", 204}})});
+      record({token->name, request.address, request.id, "deleteSession", audited_status(204)});
   }
   Response response;
   response.status = 204;

@@ -77,7 +77,7 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
 
 }  // namespace
 
-void round_numbers(std::string& json, int digits) {
+std::string rounded(std::string json, int digits) {
   const char* at = json.data();
   const char* const end = at + json.size();
   char* to = json.data();
@@ -99,12 +99,7 @@ void round_numbers(std::string& json, int digits) {
     }
   }
   json.resize(static_cast<std::size_t>(to - json.data()));
-}
-
-std::string rounded_number(std::string_view number, int digits) {
-  std::string text(number);
-  round_numbers(text, digits);
-  return text;
+  return json;
 }
 
 Result<Target> parse_target(std::string_view target) {

@@ -59,12 +59,10 @@ inline std::string number_text(double value) {
 inline constexpr int usual_digits = 10;
 inline constexpr int all_digits = 17;
 
-// Rounds the numbers of a JSON text that have a fraction or an exponent to at most `digits` significant ones,
-// half away from zero; digits before the point stay. Integers, text and the text's layout stay as they are.
-void round_numbers(std::string& json, int digits);
-
-// The same of one number written in decimals.
-std::string rounded_number(std::string_view number, int digits);
+// The JSON text, or number, with its numbers that have a fraction or an exponent rounded to at most `digits`
+// significant ones, half away from zero; digits before the point stay. Integers, text and the text's layout
+// stay as they are.
+std::string rounded(std::string json, int digits = usual_digits);
 
 struct Target {
   std::vector<std::string> segments;  // of the path, decoded one by one: "%2F" stays inside its segment

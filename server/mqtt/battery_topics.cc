@@ -50,14 +50,7 @@ BatteryTopics::BatteryTopics(Options options, Batteries batteries)
     : options_(std::move(options)),
       batteries_(std::move(batteries)),
       connection_topic_(topic(own_manufacturer, options_.broker.client_id, "connection")),
-      link_(broker_with_last_words(), [this](const std::string& why) { on_change(why); }) {}
-
-BrokerOptions BatteryTopics::broker_with_last_words() {
-  BrokerOptions broker = options_.broker;
-  broker.last_topic = connection_topic_;
-  broker.last_words = connection_message(words_of(options_.dialect).broken);
-  return broker;
-}
+      link_(options_.broker, [this](const std::string& why) { on_change(why); }) {}
 
 std::string BatteryTopics::topic(const std::string& manufacturer, const std::string& serial_number,
                                  const std::string& name) const {
@@ -86,7 +79,7 @@ std::string BatteryTopics::connection_message(const std::string& state) {
 }
 
 Result<void> BatteryTopics::start() {
-  TRY(link_.start());
+  TRY(link_.start(connection_topic_, connection_message(words_of(options_.dialect).broken)));
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   return {};
 }
@@ -94,8 +87,7 @@ Result<void> BatteryTopics::start() {
 void BatteryTopics::stop() {
   if (!thread_.joinable()) return;
   thread_ = {};
-  (void)link_.publish(connection_topic_, connection_message("OFFLINE"), 1,
-                      true);  // without a broker it is not sent
+  (void)link_.publish(connection_topic_, connection_message("OFFLINE"), true);  // not sent without a broker
   link_.stop();
 }
 
@@ -122,7 +114,7 @@ void BatteryTopics::run(const std::stop_token& stop) {
     const bool greet = std::exchange(greet_, false);
     lock.unlock();
     survive("MQTT", [&] {
-      if (greet && !link_.publish(connection_topic_, connection_message("ONLINE"), 1, true)) ++failed_;
+      if (greet && !link_.publish(connection_topic_, connection_message("ONLINE"), true)) ++failed_;
       if (link_.is_connected()) publish_all();
     });
     lock.lock();
@@ -135,28 +127,26 @@ void BatteryTopics::publish_all() {
     const std::string to = topic(options_.manufacturer, battery.robot_id, words_of(options_.dialect).object);
     const std::string message =
         begin_message(to, options_.manufacturer, battery.robot_id) + battery.object.substr(1);
-    ++(link_.publish(to, message, 0, false) ? published_ : failed_);
+    ++(link_.publish(to, message, false) ? published_ : failed_);
   }
 }
 
-Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string& field) {
-  const bool tls = url.starts_with("mqtts://");
-  if (!tls && !url.starts_with("mqtt://"))
-    return invalid(field, "must be mqtt://host[:port] or mqtts://host[:port]");
-  const auto parsed = http_client::parse_url("http" + url.substr(4), field);
+Result<void> BrokerOptions::set_url(const std::string& url) {
+  tls = url.starts_with("mqtts://");
+  const auto parsed = tls || url.starts_with("mqtt://")
+                          ? http_client::parse_url("http" + url.substr(4), "mqtt.url")
+                          : invalid("mqtt.url", "");
   if (!parsed || !parsed->base_path.empty())
-    return invalid(field, "must be mqtt://host[:port] or mqtts://host[:port]");
-  BrokerOptions options;
-  options.host = parsed->host;
-  options.tls = tls;
-  options.port = tls ? 8883 : 1883;
+    return invalid("mqtt.url", "must be mqtt://host[:port] or mqtts://host[:port]");
+  host = parsed->host;
+  port = tls ? 8883 : 1883;
   // The port that an HTTP URL has when it states none.
   if (parsed->port != (tls ? "443" : "80") || url.ends_with(":" + parsed->port))
-    std::from_chars(parsed->port.data(), parsed->port.data() + parsed->port.size(), options.port);
-  return options;
+    std::from_chars(parsed->port.data(), parsed->port.data() + parsed->port.size(), port);
+  return {};
 }
 
-Result<void> BrokerLink::start() {
+Result<void> BrokerLink::start(const std::string& last_topic, const std::string& last_words) {
   mosquitto_lib_init();
   handle_ = mosquitto_new(options_.client_id.c_str(), true, this);
   if (handle_ == nullptr) return fail(Fault::internal, "mqtt.url", "no memory for the connection");
@@ -175,10 +165,9 @@ Result<void> BrokerLink::start() {
   if (!options_.user.empty())
     TRY(done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
              "mqtt.user"));
-  TRY(done(
-      mosquitto_will_set(handle_, options_.last_topic.c_str(), static_cast<int>(options_.last_words.size()),
-                         options_.last_words.data(), 1, true),
-      "mqtt.interface"));
+  TRY(done(mosquitto_will_set(handle_, last_topic.c_str(), static_cast<int>(last_words.size()),
+                              last_words.data(), 1, true),
+           "mqtt.interface"));
   const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
   if (code == MOSQ_ERR_INVAL) return done(code, "mqtt.url");
   thread_ = std::thread([this, code] { run(code); });
@@ -192,13 +181,12 @@ Result<void> BrokerLink::set_tls() {
               "mqtt.authorities");
 }
 
-Result<void> BrokerLink::publish(const std::string& topic, const std::string& message, int quality,
-                                 bool retained) {
+Result<void> BrokerLink::publish(const std::string& topic, const std::string& message, bool retained) {
   if (!connected_) return fail(Fault::unavailable, "mqtt.url", "the broker is not connected");
   int id = 0;
   const int code = mosquitto_publish(handle_, &id, topic.c_str(), static_cast<int>(message.size()),
-                                     message.data(), quality, retained);
-  if (code == MOSQ_ERR_SUCCESS && quality > 0) {
+                                     message.data(), retained ? 1 : 0, retained);
+  if (code == MOSQ_ERR_SUCCESS && retained) {
     const std::lock_guard lock(mutex_);
     awaited_ = id;
   }

@@ -27,12 +27,10 @@ struct BrokerOptions {
   std::string authorities;  // PEM file; empty: those of the system
   std::string user, password;
   std::string client_id;
-  // Will message: the broker publishes it on that topic, retained, if the daemon vanishes.
-  std::string last_topic, last_words;
-};
 
-// mqtt://host[:port] (1883) or mqtts://host[:port] (8883, by TLS). Fault::invalid on `field`.
-Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string& field);
+  // mqtt://host[:port] (1883) or mqtts://host[:port] (8883, by TLS). Fault::invalid on "mqtt.url".
+  Result<void> set_url(const std::string& url);
+};
 
 // A connection to an MQTT 3.1.1 broker, made again when it is lost (after 1 s to 60 s). Any thread.
 class BrokerLink {
@@ -43,11 +41,14 @@ class BrokerLink {
       : options_(std::move(options)), on_change_(std::move(on_change)) {}
   ~BrokerLink() { stop(); }
 
-  // Fault::invalid where the broker's name or the authorities are unusable; not for an unreachable broker.
-  Result<void> start();
+  // `last_words` on `last_topic` is the will message: the broker publishes it, retained, if the daemon
+  // vanishes. Fault::invalid where the broker's name or the authorities are unusable; not for an unreachable
+  // broker.
+  Result<void> start(const std::string& last_topic, const std::string& last_words);
   bool is_connected() const { return connected_; }
-  // Fault::unavailable without a connection; the message is not queued.
-  Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained);
+  // Fault::unavailable without a connection; the message is not queued. The broker acknowledges retained
+  // ones.
+  Result<void> publish(const std::string& topic, const std::string& message, bool retained);
   // Disconnects from the broker.
   void stop();
 
@@ -112,7 +113,6 @@ class BatteryTopics {
   Status status() const;
 
  private:
-  BrokerOptions broker_with_last_words();
   std::string topic(const std::string& manufacturer, const std::string& serial_number,
                     const std::string& name) const;
   std::string connection_message(const std::string& state);

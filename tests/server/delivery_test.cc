@@ -18,11 +18,6 @@
 namespace joulecast::http {
 namespace {
 
-std::string rounded(std::string json, int digits) {
-  round_numbers(json, digits);
-  return json;
-}
-
 TEST(Digits, AreRoundedInDecimal) {
   EXPECT_EQ(rounded("515.6032661275617", 10), "515.6032661");
   EXPECT_EQ(rounded("-0.00012345678951", 9), "-0.00012345679");
