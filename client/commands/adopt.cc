@@ -13,12 +13,7 @@
 namespace joulecast::client {
 namespace {
 
-struct ProposalsOptions {
-  std::string server, robot_id;
-  bool json = false;
-};
-
-struct AdoptOptions : ProposalsOptions {
+struct AdoptOptions : ServerOptions {
   std::vector<Given> given;
   std::optional<std::int64_t> proposal, diagnosis, version;
   std::optional<std::string> model_file;
@@ -37,7 +32,7 @@ void print_proposals(const Json& page) {
              "no proposal");
 }
 
-Result<Exit> list_proposals(ProposalsOptions& options) {
+Result<Exit> list_proposals(ServerOptions& options) {
   const std::string path =
       options.robot_id.empty() ? "/v1/proposals" : robot_target(options.robot_id, "/proposals");
   return show(options.server, path, {{"id", "--robot-id"}}, options.json, print_proposals);
@@ -87,7 +82,7 @@ Result<Exit> adopt_model(AdoptOptions& options) {
 }  // namespace
 
 void add_proposals(CLI::App& program, Exit& exit) {
-  using O = ProposalsOptions;
+  using O = ServerOptions;
   add_command<O>(program, exit, "proposals",
                  "List models that the daemon proposes from missions, newest first", list_proposals,
                  {server_row<O>(), robot_row<O>("only proposals for this robot"), json_row<O>()},
@@ -100,7 +95,7 @@ void add_adopt(CLI::App& program, Exit& exit) {
                  "Put a model into force, after a back-test on missions that it was not fitted to",
                  adopt_model,
                  {server_row<O>(),
-                  {"robot,--robot-id", &O::robot_id, "robot that gets the model", named("ROBOT"), required},
+                  robot_row<O>("robot that gets the model", required),
                   {"--proposal", &O::proposal, "number of a proposal", positive(), alternative},
                   {"--diagnosis", &O::diagnosis, "number of a diagnosis, for the effects that it found",
                    positive(), alternative},

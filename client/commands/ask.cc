@@ -32,10 +32,10 @@ namespace {
 // A file on its own has no history of versions: it counts as the first.
 constexpr std::int64_t file_version = 1;
 
-struct AskOptions {
-  std::string robot_file, server, robot_id, request_file, plot_file, unit = energy_units.front();
+struct AskOptions : ServerOptions {
+  std::string robot_file, request_file, plot_file;
   double timeout_s = 60;
-  bool json = false, force = false;
+  bool force = false;
   std::vector<Given> given;
   std::optional<double> length_m, turn_rad;
 };
@@ -299,7 +299,7 @@ Rows common_rows(const char* robot_help) {
   return {
       {"--robot", &O::robot_file, "robot file: compute here, without a server", file_of("json")},
       {"--server", &O::server, server_help, named("URL"), Excludes{"--robot"}},
-      {"robot,--robot-id", &O::robot_id, robot_help, named("ROBOT"), Needs{"--server"}},
+      robot_row<O>(robot_help, Needs{"--server"}),
       {"--request", &O::request_file,
        "request as JSON, as the service accepts it (openapi.json), - for standard input; flags override it",
        file_of("json")},

@@ -24,10 +24,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-struct RmfOptions {
-  std::string server, robot_id, config, out = "-";
+struct RmfOptions : ServerOptions {
+  std::string config, out = "-";
   int missions = 60;
-  bool json = false, force = false;
+  bool force = false;
 };
 
 // What is written without --config. The charging current stays unknown if the robot was never seen charging.
@@ -188,7 +188,7 @@ void add_export_rmf(CLI::App& group, Exit& exit) {
       "to missions",
       export_rmf,
       {server_row<O>(),
-       {"robot,--robot-id", &O::robot_id, "robot of the server", named("ROBOT"), required},
+       robot_row<O>("robot of the server", required),
        {"--config", &O::config,
         "fleet configuration in YAML: its values are replaced and its error is reported", file_of("yaml")},
        {"--missions", &O::missions, "number of missions to fit to and test on, newest first",

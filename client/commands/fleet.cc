@@ -10,11 +10,6 @@
 namespace joulecast::client {
 namespace {
 
-struct FleetOptions {
-  std::string server, robot_id, unit = energy_units.front();
-  bool json = false;
-};
-
 // "40 s", "12 min", "5 h", "3 d"; "never" if silent_s is not a number.
 std::string age_of(const Json& state) {
   if (!state["silent_s"].is_number()) return "never";
@@ -68,11 +63,11 @@ void print_state(const Json& s, const std::string& unit) {
   for (const Json& each : s["contradictions"]) line("conflict", text_of(each["says"]));
 }
 
-Result<Exit> list_robots(FleetOptions& options) {
+Result<Exit> list_robots(ServerOptions& options) {
   return show(options.server, "/v1/robots", {}, options.json, print_fleet_table);
 }
 
-Result<Exit> show_state(FleetOptions& options) {
+Result<Exit> show_state(ServerOptions& options) {
   return show(options.server, robot_target(options.robot_id, "/state"), {{"id", "--robot-id"}}, options.json,
               [&](const Json& state) { print_state(state, options.unit); });
 }
@@ -80,19 +75,17 @@ Result<Exit> show_state(FleetOptions& options) {
 }  // namespace
 
 void add_robots(CLI::App& program, Exit& exit) {
-  using O = FleetOptions;
+  using O = ServerOptions;
   add_command<O>(program, exit, "robots", "List the robots of a daemon with their live state", list_robots,
                  {server_row<O>(), json_row<O>()}, "joulecast robots --server http://127.0.0.1:8080");
 }
 
 void add_state(CLI::App& program, Exit& exit) {
-  using O = FleetOptions;
-  add_command<O>(program, exit, "state", "Show the live state of a robot", show_state,
-                 {server_row<O>(),
-                  {"robot,--robot-id", &O::robot_id, "robot of the server", named("ROBOT"), required},
-                  unit_row<O>(),
-                  json_row<O>()},
-                 "joulecast state amr --server http://127.0.0.1:8080");
+  using O = ServerOptions;
+  add_command<O>(
+      program, exit, "state", "Show the live state of a robot", show_state,
+      {server_row<O>(), robot_row<O>("robot of the server", required), unit_row<O>(), json_row<O>()},
+      "joulecast state amr --server http://127.0.0.1:8080");
 }
 
 }  // namespace joulecast::client

@@ -32,11 +32,10 @@ constexpr const char* example = R"({
             {"task_id": "patrol", "empty": {}, "loaded": {"distances_m": [30, 30], "turns_rad": [3.1416]}}]
 })";
 
-struct MatrixOptions {
-  std::string request_file, server, driving, unit = energy_units.front();
+struct MatrixOptions : ServerOptions {
+  std::string request_file, driving;
   std::vector<std::string> robot_files;
   double timeout_s = 60;
-  bool json = false;
 };
 
 Result<std::string> answer_here(const MatrixOptions& options, Json request) {

@@ -15,10 +15,8 @@ namespace {
 
 constexpr auto& state_names = history::names_of<history::MissionState>;
 
-struct MissionsOptions {
-  std::string server, unit = energy_units.front();
+struct MissionsOptions : ServerOptions {
   std::vector<Given> given;
-  bool json = false;
 };
 
 void print_page(const Json& page, const std::string& unit) {
@@ -42,9 +40,8 @@ Result<Exit> run_missions(MissionsOptions& options) {
               options.json, [&](const Json& page) { print_page(page, options.unit); });
 }
 
-struct LedgerOptions {
-  std::string server, mission, unit = energy_units.front();
-  bool json = false;
+struct LedgerOptions : ServerOptions {
+  std::string mission;
 };
 
 void print_ledger(const Json& answer, const std::string& unit) {

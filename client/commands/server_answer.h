@@ -36,6 +36,12 @@ inline constexpr const char* accept_json = "application/json, application/proble
 // The error of a reply other than 2xx: title and detail of its problem+json, and the fault of its status.
 [[nodiscard]] Error error_of(const HttpReply& reply);
 
+// Options of commands that ask a daemon.
+struct ServerOptions {
+  std::string server, robot_id, unit = energy_units.front();
+  bool json = false;
+};
+
 // Rows of the tables of options; the Options have members of these names.
 inline constexpr const char* server_help = "joulecastd to send the request to, host:port";
 inline constexpr const char* mission_help = "number or id of the mission, as joulecast missions lists it";
@@ -44,9 +50,9 @@ Row<Options> server_row() {
   return {"--server", &Options::server, server_help, Value{.name = "URL", .variable = "JOULECAST_SERVER"},
           required};
 }
-template <class Options>
-Row<Options> robot_row(const char* help) {
-  return {"robot,--robot-id", &Options::robot_id, help, named("ROBOT")};
+template <class Options, class... Traits>
+Row<Options> robot_row(const char* help, const Traits&... traits) {
+  return {"robot,--robot-id", &Options::robot_id, help, named("ROBOT"), traits...};
 }
 template <class Options>
 Row<Options> json_row(const char* help = "print the answer as the server sends it") {
