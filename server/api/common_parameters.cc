@@ -20,23 +20,26 @@ Result<std::int64_t> path_id(const http::Request& request, std::string_view thin
   return *id;
 }
 
+Parameter bounded(Parameter::Type type, std::string name, std::string words, std::optional<double> minimum,
+                  std::optional<double> maximum) {
+  return {.name = std::move(name),
+          .type = type,
+          .description = std::move(words),
+          .minimum = minimum,
+          .maximum = maximum};
+}
+
 Parameter digits_parameter() {
-  return {.name = "digits",
-          .type = Parameter::Type::integer,
-          .description = "significant digits of numbers that are no integers, " +
-                         std::to_string(http::usual_digits) + " if absent; " +
-                         std::to_string(http::all_digits) + ": all",
-          .minimum = 2,
-          .maximum = http::all_digits};
+  return bounded(Parameter::Type::integer, "digits",
+                 "significant digits of numbers that are no integers, " + std::to_string(http::usual_digits) +
+                     " if absent; " + std::to_string(http::all_digits) + ": all",
+                 2, http::all_digits);
 }
 
 Parameter limit_parameter(const std::string& things, std::int64_t usual, std::int64_t maximum) {
-  return {.name = "limit",
-          .type = Parameter::Type::integer,
-          .description = things,
-          .minimum = 1,
-          .maximum = static_cast<double>(maximum),
-          .usual = static_cast<double>(usual)};
+  Parameter limit = bounded(Parameter::Type::integer, "limit", things, 1, static_cast<double>(maximum));
+  limit.usual = static_cast<double>(usual);
+  return limit;
 }
 
 Parameter cursor_parameter() {
@@ -108,16 +111,12 @@ Result<std::vector<std::string>> robot_ids_of(const http::Request& request) {
 
 std::vector<Parameter> range_parameters(const std::string& things) {
   const std::string forms(utc_forms);
-  const auto as_number = [](std::string name) {
-    return Parameter{.name = std::move(name),
-                     .type = Parameter::Type::integer,
-                     .description = "the same in microseconds since 1970"};
-  };
+  constexpr const char* as_number = "the same in microseconds since 1970";
   return {{.name = "from", .description = "only " + things + " from this time on, " + forms},
-          as_number("from_utime_us"),
+          bounded(Parameter::Type::integer, "from_utime_us", as_number),
           {.name = "to",
            .description = "only " + things + " before this time, " + forms + "; a date includes that day"},
-          as_number("to_utime_us")};
+          bounded(Parameter::Type::integer, "to_utime_us", as_number)};
 }
 
 Result<history::TimeRange> range_of(const http::Request& request) {

@@ -23,6 +23,10 @@ namespace joulecast::api {
 Result<std::int64_t> path_id(const http::Request& request, std::string_view thing,
                              const std::string& name = "id");
 
+// A number or an integer within bounds.
+http::Parameter bounded(http::Parameter::Type type, std::string name, std::string words,
+                        std::optional<double> minimum = {}, std::optional<double> maximum = {});
+
 // ?digits=: significant digits of the numbers in the response.
 http::Parameter digits_parameter();
 

@@ -156,11 +156,8 @@ Part floor_map_part() {
                 range_parameters("missions that started"),
                 {{.name = "robot_id",
                   .description = "only this robot, or these, separated by commas: those that share a map"},
-                 {.name = "cell_m",
-                  .type = Parameter::Type::number,
-                  .description = "side of a square, m; 1 if absent",
-                  .minimum = history::least_floor_cell_m,
-                  .maximum = history::greatest_floor_cell_m},
+                 bounded(Parameter::Type::number, "cell_m", "side of a square, m; 1 if absent",
+                         history::least_floor_cell_m, history::greatest_floor_cell_m),
                  limit_parameter("squares, the longest visited first", usual_cells, most_cells)}),
             .csv = true,
             .rounded = true});

@@ -9,6 +9,7 @@
 #include "base/try.h"
 #include "robot/robot_fields.h"
 #include "server/api/change.h"
+#include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
 // Floor plans by map and level, and the map and level on which each robot drives.
@@ -184,13 +185,7 @@ Result<Response> get_plan(const Services& services, const Request& request) {
 
 Part map_part() {
   constexpr const char* path = "/v1/maps/{map}/levels/{level}";
-  const auto number = [](std::string name, std::string words, double bound) {
-    return Parameter{.name = std::move(name),
-                     .type = Parameter::Type::number,
-                     .description = std::move(words),
-                     .minimum = -bound,
-                     .maximum = bound};
-  };
+  constexpr auto number = Parameter::Type::number;
   Rows rows;
   rows.add(Method::get, "/v1/maps", "listMaps", Role::read,
            "Floor plans, and the map and level on which each robot drives", "maps", list_maps);
@@ -201,16 +196,17 @@ Part map_part() {
       "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its scale and origin as in "
       "a map.yaml of ROS",
       "floor-plan", put_plan,
-      {.parameters = {{.name = "resolution_m",
-                       .type = Parameter::Type::number,
-                       .description = "side of a pixel of the image, m",
-                       .minimum = 1e-4,
-                       .maximum = 100,
-                       .required = true},
-                      number("origin_x_m", "the image's lower left corner in the map; 0 if absent", 1e6),
-                      number("origin_y_m", "the image's lower left corner in the map; 0 if absent", 1e6),
-                      number("origin_yaw_rad", "rotation of the image about that corner; 0 if absent", 7),
-                      {.name = "chargers", .description = "places of chargers in the map, m, as x,y;x,y"}},
+      {.parameters =
+           {{.name = "resolution_m",
+             .type = number,
+             .description = "side of a pixel of the image, m",
+             .minimum = 1e-4,
+             .maximum = 100,
+             .required = true},
+            bounded(number, "origin_x_m", "the image's lower left corner in the map; 0 if absent", -1e6, 1e6),
+            bounded(number, "origin_y_m", "the image's lower left corner in the map; 0 if absent", -1e6, 1e6),
+            bounded(number, "origin_yaw_rad", "rotation of the image about that corner; 0 if absent", -7, 7),
+            {.name = "chargers", .description = "places of chargers in the map, m, as x,y;x,y"}},
        .request_types = {"image/png", "image/svg+xml"},
        .max_body_bytes = most_plan_bytes,
        .error_statuses = {413, 422},

@@ -42,12 +42,6 @@ Result<history::MissionFilter> filter_of(const Request& request) {
 
 std::vector<Parameter> filter_parameters() {
   const auto& state_names = history::names_of<history::MissionState>;
-  const auto bound = [](std::string name, std::string what, std::optional<double> minimum) {
-    return Parameter{.name = std::move(name),
-                     .type = Type::number,
-                     .description = "only missions with " + std::move(what),
-                     .minimum = minimum};
-  };
   return with(
       range_parameters("missions that started"),
       {
@@ -62,10 +56,12 @@ std::vector<Parameter> filter_parameters() {
           {.name = "incomplete",
            .type = Type::boolean,
            .description = "only missions with (true) or without (false) unmeasured parts"},
-          bound("payload_min_kg", "at least this payload", 0),
-          bound("payload_max_kg", "at most this payload", 0),
-          bound("ratio_min", "at least this ratio of measured to modelled energy", std::nullopt),
-          bound("ratio_max", "at most this ratio of measured to modelled energy", std::nullopt),
+          bounded(Type::number, "payload_min_kg", "only missions with at least this payload", 0),
+          bounded(Type::number, "payload_max_kg", "only missions with at most this payload", 0),
+          bounded(Type::number, "ratio_min",
+                  "only missions with at least this ratio of measured to modelled energy"),
+          bounded(Type::number, "ratio_max",
+                  "only missions with at most this ratio of measured to modelled energy"),
       });
 }
 
@@ -255,12 +251,10 @@ Part mission_list_part() {
              .description =
                  "also the sums of each robot, day, week or kind of robot, or of each robot by day or week",
              .choices = grouping_names()},
-            {.name = "utc_offset_min",
-             .type = Type::integer,
-             .description = "days begin at midnight, weeks on Monday, of a clock so many minutes ahead of "
-                            "UTC; 0 if absent",
-             .minimum = -1440,
-             .maximum = 1440}}),
+            bounded(Type::integer, "utc_offset_min",
+                    "days begin at midnight, weeks on Monday, of a clock so many minutes ahead of UTC; 0 if "
+                    "absent",
+                    -1440, 1440)}),
        .csv = true,
        .rounded = true});
   rows.add(Method::get, "/v1/tariff", "getTariff", Role::read,

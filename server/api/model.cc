@@ -327,14 +327,9 @@ Part model_part() {
   rows.add(Method::get, "/v1/robots/{id}/models/diff", "compareModels", Role::read,
            "Differences between two versions of a robot's model", "model-diff", diff,
            {.former_path = "/v1/robots/{id}/versions/diff",
-            .parameters = {{.name = "from",
-                            .type = Type::integer,
-                            .description = "version before; default: the one that `to` was made from",
-                            .minimum = 1},
-                           {.name = "to",
-                            .type = Type::integer,
-                            .description = "version after; default: the one in force",
-                            .minimum = 1}},
+            .parameters = {bounded(Type::integer, "from",
+                                   "version before; default: the one that `to` was made from", 1),
+                           bounded(Type::integer, "to", "version after; default: the one in force", 1)},
             .etag = true,
             .error_statuses = {404}});
   rows.add(

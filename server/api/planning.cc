@@ -16,6 +16,7 @@
 #include "base/try.h"
 #include "describe/input.h"
 #include "ingest/model_registry.h"
+#include "server/api/common_parameters.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 
@@ -275,11 +276,9 @@ Part planning_part() {
         .role = Role::plan,
         .summary =
             "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
-        .parameters = {{.name = "model_version",
-                        .type = Parameter::Type::integer,
-                        .description =
-                            "the version of the robot's model to plan with; default: the one in force",
-                        .minimum = 1}},
+        .parameters = {bounded(Parameter::Type::integer, "model_version",
+                               "the version of the robot's model to plan with; default: the one in force",
+                               1)},
         .request_schema = "profile-request",
         .response_schema = "profile",
         .rounded = true,
