@@ -16,12 +16,7 @@ class Progress : boost::noncopyable {
   Progress(std::string work, std::string unit, std::uint64_t total = 0);
   ~Progress();
 
-  // Suitable for every step of a loop: the clock is read once in 1024 calls.
-  void advance(std::uint64_t by = 1) {
-    done_ += by;
-    if ((++calls_ & 1023U) == 0) draw_if_due();
-  }
-  // For coarse steps: draws when the last drawing is older than a tenth of a second.
+  // Draws when the last drawing is older than a tenth of a second.
   void reach(std::uint64_t done) {
     done_ = done;
     draw_if_due();
@@ -41,7 +36,7 @@ class Progress : boost::noncopyable {
   void draw_if_due();
 
   std::string work_, unit_;
-  std::uint64_t total_, done_ = 0, calls_ = 0;
+  std::uint64_t total_, done_ = 0;
   bool terminal_;
   bool drawn_ = false;
   Clock::time_point begin_ = Clock::now();

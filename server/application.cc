@@ -686,7 +686,8 @@ Result<std::string> openapi_document() {
   Metrics metrics;
   http::EventHub events;
   std::vector<http::Endpoint> table = api::described_endpoints();
-  for (http::Endpoint& row : http::described_session_endpoints()) table.push_back(std::move(row));
+  TRY_ASSIGN(const auto gate, http::Gate::open({}));
+  for (http::Endpoint& row : gate->session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
   return http::openapi_document(table, api::schemas(), embedded_examples());

@@ -83,9 +83,7 @@ std::vector<std::string> files(const std::string& begin, const std::string& endi
 }
 
 std::vector<std::string> robots_of(const std::string& server) {
-  const auto address = parse_server_url(server);
-  if (!address) return {};
-  const auto reply = http_request(*address, HttpMethod::get, "/v1/robots", {}, std::chrono::seconds(1));
+  const auto reply = http_request(server, HttpMethod::get, "/v1/robots", {}, std::chrono::seconds(1));
   if (!reply || !reply->ok()) return {};
   const auto answer = nlohmann::json::parse(reply->body, nullptr, false);
   std::vector<std::string> ids;

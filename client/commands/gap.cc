@@ -205,10 +205,9 @@ Result<void> write_model(const GapOptions& options, const Json& job) {
 Result<Json> adopt_diagnosis(const GapOptions& options, const Json& job) {
   Json wanted = {{"diagnosis_id", job["id"]}, {"force", options.force}};
   if (!options.effect.empty()) wanted["effect"] = options.effect;
-  TRY_ASSIGN(const auto address, parse_server_url(options.server));
   TRY_ASSIGN(const auto reply,
-             http_request(address, HttpMethod::post, robot_target(options.robot_id, "/models"), wanted.dump(),
-                          std::chrono::minutes(1)));
+             http_request(options.server, HttpMethod::post, robot_target(options.robot_id, "/models"),
+                          wanted.dump(), std::chrono::minutes(1)));
   if (!reply.ok() && reply.status != 409) {
     Error error = error_of(reply);
     if (error.field == "/effect") error.field = "--effect";

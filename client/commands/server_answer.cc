@@ -55,8 +55,7 @@ Renamed renamed_by(const std::vector<Given>& given) {
 Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::string& target,
                       const std::string& body, const Renamed& renamed, const std::string& accept,
                       std::chrono::milliseconds timeout) {
-  TRY_ASSIGN(const auto address, parse_server_url(server));
-  auto reply = http_request(address, method, target, body, timeout, accept);
+  auto reply = http_request(server, method, target, body, timeout, accept);
   if (!reply || reply->ok()) return reply;
   Error error = error_of(*reply);
   if (reply->status == 404 && (error.field.empty() || error.field == "path"))
@@ -133,18 +132,15 @@ Result<Exit> show(const std::string& server, const std::string& target, const Re
   return Exit::ok;
 }
 
-Result<ServerAddress> parse_server_url(std::string_view url) {
-  return http_client::parse_url(url, "--server");
-}
-
-Result<HttpReply> http_request(const ServerAddress& server, HttpMethod method, std::string_view target,
+Result<HttpReply> http_request(const std::string& server, HttpMethod method, std::string_view target,
                                std::string json_body, std::chrono::milliseconds timeout,
                                const std::string& accept) {
+  TRY_ASSIGN(const auto address, http_client::parse_url(server, "--server"));
   http_client::HttpRequest request{method, std::string(target), std::move(json_body), {{"Accept", accept}}};
   if (const std::string token = environment("JOULECAST_TOKEN"); !token.empty())
     request.headers.emplace_back("Authorization", "Bearer " + token);
   request.certificate = {environment("JOULECAST_CLIENT_CERTIFICATE"), environment("JOULECAST_CLIENT_KEY")};
-  return http_client::exchange(server, request, timeout);
+  return http_client::exchange(address, request, timeout);
 }
 
 Error error_of(const HttpReply& reply) {

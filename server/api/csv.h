@@ -19,7 +19,6 @@ class Csv {
   Csv(const http::Request& request, std::vector<std::string> columns);
 
   Csv& field(std::string_view text);
-  Csv& field(const std::string& text) { return field(std::string_view(text)); }
   Csv& field(const char* text) { return field(std::string_view(text)); }
   Csv& field(double number);  // resolved() (base/json_writer.h) and rounded
   Csv& exact(double number);  // all digits, for raw data

@@ -19,14 +19,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-Result<robot::RobotModel> candidate_of(const std::string& model_json, const std::string& robot_id,
-                                       const std::string& owner, std::string_view field) {
-  if (owner != robot_id)
-    return invalid("/" + std::string(field), "belongs to robot " + owner + ", not to " + robot_id);
-  if (model_json.empty()) return fail(Fault::conflict, "/" + std::string(field), "holds nothing to adopt");
-  return robot::parse_robot(model_json);
-}
-
 // The reason why an open proposal is obsolete: the version that it changes is no longer in force.
 std::optional<std::string> moot_of(const Services& services, const history::Proposal& p) {
   const auto now = services.models.find(p.robot_id);
@@ -110,12 +102,15 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     if (proposal.state != history::ProposalState::open)
       return fail(Fault::conflict, "/proposal_id",
                   "the proposal is " + std::string(history::name(proposal.state)) + " already");
-    model = candidate_of(proposal.model_json, robot_id, proposal.robot_id, "proposal_id");
     adoption.origin = history::ModelOrigin::calibration;
     adoption.note = r.note.value_or(proposal.note);
     fitted_on = std::move(proposal.fitted_on);
     if (const auto moot = moot_of(services, proposal); moot && !r.force)
       return fail(Fault::conflict, "/proposal_id", *moot + "; set force to adopt it anyway");
+    if (proposal.robot_id != robot_id)
+      return invalid("/proposal_id", "belongs to robot " + proposal.robot_id + ", not to " + robot_id);
+    if (proposal.model_json.empty()) return fail(Fault::conflict, "/proposal_id", "holds nothing to adopt");
+    model = robot::parse_robot(proposal.model_json);
   }
   if (!model) return tl::unexpected(std::move(model.error()));
   if (auto effects = dynamics::active_effects(*model); !effects) {

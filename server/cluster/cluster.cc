@@ -363,7 +363,11 @@ Result<std::size_t> Cluster::reassign(const history::ClusterState& state) {
       parts_.forecasts.learnt_elsewhere(lease.robot_id);
       parts_.keeping.grant({lease.robot_id, lease.epoch, lease.position});
     }
-    count_taken(assigned.take, taken);
+    const std::lock_guard lock(mutex_);
+    for (const history::Lease& lease : taken) {
+      const auto before = std::ranges::find(assigned.take, lease.robot_id, &history::Lease::robot_id);
+      if (before != assigned.take.end() && !before->node.empty()) ++status_.takeovers;
+    }
   }
   for (const history::Lease& lease : assigned.hand_over) {
     const history::Epoch epoch = parts_.keeping.epoch_of(lease.robot_id);
@@ -382,14 +386,6 @@ bool Cluster::keeps(const history::Lease& lease) {
   const auto found = letting_go_.find(lease.robot_id);
   return found != letting_go_.end() && found->second.epoch == lease.epoch &&
          Clock::now() - found->second.since < longest_release;
-}
-
-void Cluster::count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken) {
-  const std::lock_guard lock(mutex_);
-  for (const history::Lease& lease : taken) {
-    const auto before = std::ranges::find(seen, lease.robot_id, &history::Lease::robot_id);
-    if (before != seen.end() && !before->node.empty()) ++status_.takeovers;
-  }
 }
 
 Result<void> Cluster::take_jobs() {

@@ -100,7 +100,6 @@ class Cluster {
   Result<bool> bury(const history::ClusterState& state);
   Result<std::size_t> reassign(const history::ClusterState& state);
   bool keeps(const history::Lease& lease);
-  void count_taken(const std::vector<history::Lease>& seen, const std::vector<history::Lease>& taken);
   Result<void> take_jobs();
   void exchange(const std::stop_token& stop);
 

@@ -12,10 +12,6 @@ namespace {
 namespace net = boost::asio;
 namespace bhttp = boost::beast::http;
 
-std::string_view view(boost::string_view text) {
-  return {text.data(), text.size()};
-}
-
 // "name:80" -> "name", "[::1]:80" -> "::1"; a root dot at the end is no part of the name. Empty for none.
 std::string_view name_of(std::string_view authority) {
   if (authority.starts_with('[')) {

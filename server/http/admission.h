@@ -15,6 +15,10 @@
 
 namespace joulecast::http {
 
+inline std::string_view view(boost::string_view text) {
+  return {text.data(), text.size()};
+}
+
 struct Denial {
   Refusal refusal = Refusal::malformed;
   unsigned status = 400;

@@ -343,7 +343,7 @@ described::Schemas session_schemas() {
   return {{"session", token_table.schema()}, {"session-request", session_input.schema()}};
 }
 
-std::vector<Endpoint> described_session_endpoints() {
+std::vector<Endpoint> Gate::session_endpoints() {
   return {{.method = Method::post,
            .path = "/v1/session",
            .operation_id = "createSession",
@@ -354,7 +354,8 @@ std::vector<Endpoint> described_session_endpoints() {
            .max_body_bytes = 4096,
            .response_schema = "session",
            .error_statuses = {401, 409, 429},
-           .run = Run::io},
+           .run = Run::io,
+           .handler = [this](const Request& request) { return sign_in(request); }},
           {.method = Method::del,
            .path = "/v1/session",
            .operation_id = "deleteSession",
@@ -362,14 +363,8 @@ std::vector<Endpoint> described_session_endpoints() {
            .tag = "access",
            .summary = "Signs the browser out, where it is signed in",
            .success_status = 204,
-           .run = Run::io}};
-}
-
-std::vector<Endpoint> Gate::session_endpoints() {
-  std::vector<Endpoint> rows = described_session_endpoints();
-  rows[0].handler = [this](const Request& request) { return sign_in(request); };
-  rows[1].handler = [this](const Request& request) { return sign_out(request); };
-  return rows;
+           .run = Run::io,
+           .handler = [this](const Request& request) { return sign_out(request); }}};
 }
 
 }  // namespace joulecast::http

@@ -95,8 +95,6 @@ class Gate {
   std::map<std::string, std::int64_t> sign_ins_of_;   // by hash of the token
 };
 
-// The rows of session_endpoints() for documents, without handlers.
-std::vector<Endpoint> described_session_endpoints();
 described::Schemas session_schemas();
 
 }  // namespace joulecast::http

@@ -310,9 +310,4 @@ Response Router::fault(const Endpoint& endpoint, const Request& request, const E
   return problem(Error{error.fault, field_of(endpoint, request, error), error.message}, request.id);
 }
 
-Response Router::handle(Request& request) const {
-  auto match = this->match(request);
-  return match.answer ? std::move(*match.answer) : run(*match.endpoint, request);
-}
-
 }  // namespace joulecast::http

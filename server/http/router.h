@@ -122,9 +122,6 @@ class Router {
   // The response of `brief`, if the endpoint has one and it answers.
   std::optional<Response> run_brief(const Endpoint& endpoint, Request& request) const;
 
-  // match() and run() in one, for tests and in-process callers.
-  Response handle(Request& request) const;
-
   const std::vector<Endpoint>& endpoints() const { return endpoints_; }
 
  private:

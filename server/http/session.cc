@@ -15,10 +15,6 @@ namespace bhttp = beast::http;
 using boost::system::error_code;
 constexpr std::size_t kept_buffer_bytes = 64 * 1024;
 
-std::string_view view(boost::string_view text) {
-  return {text.data(), text.size()};
-}
-
 Method method_of(bhttp::verb verb) {
   static constexpr bhttp::verb verbs[] = {bhttp::verb::get,    bhttp::verb::head,  bhttp::verb::post,
                                           bhttp::verb::put,    bhttp::verb::patch, bhttp::verb::delete_,

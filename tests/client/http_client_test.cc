@@ -37,7 +37,8 @@ class OneAnswer {
     ::close(listener_);
   }
 
-  ServerAddress address() const { return {"127.0.0.1", std::to_string(port_), ""}; }
+  http_client::ServerAddress address() const { return {"127.0.0.1", std::to_string(port_), ""}; }
+  std::string url() const { return "127.0.0.1:" + std::to_string(port_); }
   // The request; waits until the exchange is over.
   const std::string& request() {
     thread_.join();
@@ -78,30 +79,30 @@ class OneAnswer {
 };
 
 TEST(ServerUrl, SplitsHostPortAndPath) {
-  const auto full = parse_server_url("http://fleet.example:8080/joulecast/");
+  const auto full = http_client::parse_url("http://fleet.example:8080/joulecast/", "--server");
   ASSERT_TRUE(full);
   EXPECT_EQ(full->host, "fleet.example");
   EXPECT_EQ(full->port, "8080");
   EXPECT_EQ(full->base_path, "/joulecast");
-  const auto bare = parse_server_url("http://localhost");
+  const auto bare = http_client::parse_url("http://localhost", "--server");
   ASSERT_TRUE(bare);
   EXPECT_EQ(bare->port, "80");
   EXPECT_EQ(bare->base_path, "");
-  const auto plain = parse_server_url("localhost:8080");
+  const auto plain = http_client::parse_url("localhost:8080", "--server");
   ASSERT_TRUE(plain);
   EXPECT_EQ(plain->host + '|' + plain->port, "localhost|8080");
-  const auto six = parse_server_url("http://[::1]:99");
+  const auto six = http_client::parse_url("http://[::1]:99", "--server");
   ASSERT_TRUE(six);
   EXPECT_EQ(six->host, "::1");
   EXPECT_EQ(six->port, "99");
   EXPECT_FALSE(six->tls);
-  const auto secure = parse_server_url("https://fleet.example/joulecast");
+  const auto secure = http_client::parse_url("https://fleet.example/joulecast", "--server");
   ASSERT_TRUE(secure);
   EXPECT_TRUE(secure->tls);
   EXPECT_EQ(secure->host + '|' + secure->port, "fleet.example|443");
   for (const char* wrong : {"https://", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999",
                             "http://h:8o", "http://user:hunter2@h", "http://h?hunter2"}) {
-    const auto refused = parse_server_url(wrong);
+    const auto refused = http_client::parse_url(wrong, "--server");
     ASSERT_FALSE(refused) << wrong;
     EXPECT_EQ(describe(refused.error()).find("hunter2"), std::string::npos) << "a secret";
   }
@@ -111,7 +112,7 @@ TEST(HttpClient, SendsBodyAndReadsReply) {
   OneAnswer server(
       "HTTP/1.1 201 Created\r\nContent-Type: application/json\r\nContent-Length: 8\r\n\r\n{\"a\": 1}");
   const auto reply =
-      http_request(server.address(), HttpMethod::put, "/v1/robots/r1", "{\"robot_id\":\"r1\"}", 2s);
+      http_request(server.url(), HttpMethod::put, "/v1/robots/r1", "{\"robot_id\":\"r1\"}", 2s);
   ASSERT_TRUE(reply) << describe(reply.error());
   EXPECT_EQ(reply->status, 201u);
   EXPECT_TRUE(reply->ok());
@@ -126,7 +127,7 @@ TEST(HttpClient, ProblemsKeepFaultAndText) {
   OneAnswer server(
       "HTTP/1.1 404 Not Found\r\nContent-Type: application/problem+json\r\nContent-Length: 47\r\n\r\n"
       "{\"title\": \"no such robot\", \"detail\": \"r9 is none\"}");
-  const auto reply = http_request(server.address(), HttpMethod::get, "/v1/robots/r9", "", 2s);
+  const auto reply = http_request(server.url(), HttpMethod::get, "/v1/robots/r9", "", 2s);
   ASSERT_TRUE(reply);
   EXPECT_FALSE(reply->ok());
   EXPECT_EQ(error_of(*reply).fault, Fault::not_found);
@@ -153,15 +154,15 @@ TEST(HttpClient, SilenceAndAbsenceAreUnavailable) {
   const auto before = std::chrono::steady_clock::now();
   {
     OneAnswer silent("");
-    const auto reply = http_request(silent.address(), HttpMethod::get, "/", "", 200ms);
+    const auto reply = http_request(silent.url(), HttpMethod::get, "/", "", 200ms);
     ASSERT_FALSE(reply);
     EXPECT_EQ(reply.error().fault, Fault::unavailable);
   }
   EXPECT_LT(std::chrono::steady_clock::now() - before, 5s);
-  ServerAddress closed;
+  std::string closed;
   {
     OneAnswer gone("x");
-    closed = gone.address();
+    closed = gone.url();
     // Open and close the one connection so that the listener ends.
     (void)http_request(closed, HttpMethod::get, "/", "", 200ms);
   }

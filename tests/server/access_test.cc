@@ -19,6 +19,7 @@
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
 #include "server/metrics.h"
+#include "tests/server/handled.h"
 
 namespace joulecast::http {
 namespace {
@@ -119,7 +120,7 @@ class AccessTest : public ::testing::Test {
     if (!authorization.empty()) request.headers.emplace_back("Authorization", authorization);
     if (!cookie.empty()) request.headers.emplace_back("Cookie", cookie);
     if (!request.body.empty()) request.headers.emplace_back("Content-Type", "application/json");
-    return router_->handle(request);
+    return http::handled(*router_, request);
   }
   Response ask_with(const std::string& secret, Method method, const std::string& target) {
     return ask(method, target, "Bearer " + secret);

@@ -14,6 +14,7 @@
 #include "base/text.h"
 #include "server/http/router.h"
 #include "server/http/text.h"
+#include "tests/server/handled.h"
 
 namespace joulecast::http {
 namespace {
@@ -58,7 +59,7 @@ Response answer_of(const Router& router, std::vector<std::pair<std::string_view,
   request.target = target;
   request.id = "t";
   request.headers = std::move(headers);
-  return router.handle(request);
+  return http::handled(router, request);
 }
 
 std::string header(const Response& response, std::string_view name) {

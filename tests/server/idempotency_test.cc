@@ -8,6 +8,7 @@
 
 #include "server/api/change.h"
 #include "server/api/csv.h"
+#include "tests/server/handled.h"
 
 namespace joulecast::api {
 namespace {
@@ -57,7 +58,7 @@ class IdempotencyTest : public ::testing::Test {
     request.actor = actor;
     request.body = body;
     if (!key.empty()) request.headers.emplace_back("Idempotency-Key", key);
-    return router_->handle(request);
+    return http::handled(*router_, request);
   }
 
   static std::string header(const Response& response, const std::string& name) {

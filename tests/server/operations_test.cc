@@ -13,6 +13,7 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
+#include "tests/server/handled.h"
 
 namespace joulecast::http {
 namespace {
@@ -25,7 +26,7 @@ Response get(const Router& router, std::string_view target,
   request.target = target;
   request.headers = std::move(headers);
   request.id = "r";
-  return router.handle(request);
+  return http::handled(router, request);
 }
 
 std::string header(const Response& response, std::string_view name) {

@@ -7,6 +7,7 @@
 #include "base/json_text.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
+#include "tests/server/handled.h"
 
 namespace joulecast::http {
 namespace {
@@ -77,7 +78,7 @@ class RouterTest : public ::testing::Test {
     request.headers = std::move(headers);
     request.body = std::move(body);
     request.id = "r1";
-    return router_.handle(request);
+    return http::handled(router_, request);
   }
   Router router_{table()};
 };
@@ -241,7 +242,7 @@ TEST(Router, ErrorsNameClientFields) {
     request.target = std::move(target);
     request.headers = {{"Content-Type", "application/json"}};
     request.body = "{}";
-    return json::parse(router.handle(request).body);
+    return json::parse(http::handled(router, request).body);
   };
   EXPECT_EQ(told(Method::get, "/missions/9").at("field"), "id");
   EXPECT_EQ(told(Method::get, "/missions/9").at("constraint"), "is wrong");
