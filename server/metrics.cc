@@ -53,14 +53,6 @@ prometheus::Histogram& Metrics::histogram(const std::string& name, const std::st
                                                                                     upper_bounds);
 }
 
-std::vector<prometheus::Counter*> Metrics::counters(const std::string& name, const std::string& help,
-                                                    const std::string& label,
-                                                    const std::vector<std::string>& values) {
-  std::vector<prometheus::Counter*> made;
-  for (const auto& value : values) made.push_back(&counter(name, help, {{label, value}}));
-  return made;
-}
-
 void Metrics::series(std::function<std::vector<Series>()> read) {
   const std::lock_guard lock(mutex_);
   readers_.push_back(std::move(read));
@@ -72,12 +64,6 @@ std::string Metrics::text() const {
   for (const auto& read : readers_)
     for (const Series& series : read()) families.push_back(family_of(series));
   return prometheus::TextSerializer().Serialize(families);
-}
-
-const std::vector<double>& Metrics::request_seconds() {
-  static const std::vector<double> bounds{50e-6, 100e-6, 250e-6, 500e-6, 1e-3, 2.5e-3, 5e-3, 10e-3,
-                                          25e-3, 50e-3,  100e-3, 250e-3, 0.5,  1.0,    2.5,  10.0};
-  return bounds;
 }
 
 }  // namespace joulecast

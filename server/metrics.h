@@ -24,10 +24,6 @@ class Metrics {
   prometheus::Counter& counter(const std::string& name, const std::string& help, const Labels& labels = {});
   prometheus::Histogram& histogram(const std::string& name, const std::string& help,
                                    const std::vector<double>& upper_bounds, const Labels& labels = {});
-  // One counter for each value of a label, all present from the start at zero, in the order of the values.
-  std::vector<prometheus::Counter*> counters(const std::string& name, const std::string& help,
-                                             const std::string& label,
-                                             const std::vector<std::string>& values);
 
   // Metrics that are read again before each text(): counters where the name ends in _total, otherwise gauges.
   // Values of labels that are left out disappear; the reader bounds their number and must be thread-safe.
@@ -49,9 +45,6 @@ class Metrics {
   std::string text() const;
 
   static std::string_view content_type() { return "text/plain; version=0.0.4; charset=utf-8"; }
-
-  // Upper bounds for request durations, from 50 µs to 10 s.
-  static const std::vector<double>& request_seconds();
 
  private:
   prometheus::Registry registry_;

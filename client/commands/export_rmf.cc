@@ -22,8 +22,6 @@
 namespace joulecast::client {
 namespace {
 
-using Json = nlohmann::json;
-
 struct RmfOptions : ServerOptions {
   std::string config, out = "-";
   int missions = 60;

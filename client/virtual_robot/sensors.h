@@ -75,7 +75,6 @@ class Sensors {
   // A sample without its clock: systematic errors, noise, quantisation, missing channels as NaN.
   signals::Sample sample(const Reading& truth);
 
-  const SensorSuite& suite() const { return suite_; }
   Rng& rng() { return rng_; }
 
  private:

@@ -205,7 +205,7 @@ void VirtualRobot::take_what_is_due() {
 }
 
 void VirtualRobot::publish_covariates() {
-  const bool noise = sensors_.suite().noise;
+  const bool noise = spec_.sensors.noise;
   double height_m = plant_.height_m();
   if (noise) height_m += spec_.sensors.height_noise_m * computer_rng_.normal();
   outbox_.push_back(
@@ -230,7 +230,7 @@ void VirtualRobot::take_sample() {
   sample.utime_us = now_us();
   sample.sequence = sample_index_;
   const bool lost =
-      sensors_.suite().loss_probability > 0 && sensors_.rng().chance(sensors_.suite().loss_probability);
+      spec_.sensors.loss_probability > 0 && sensors_.rng().chance(spec_.sensors.loss_probability);
   if (!lost) outbox_.push_back({sample.utime_us, sample});
   ++sample_index_;
   next_sample_s_ = sample_time_s(sample_index_);

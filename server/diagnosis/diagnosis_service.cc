@@ -57,11 +57,9 @@ Json summary_of(const ordered_json& result) {
                        {"probability", effect["probability"]},
                        {"share", effect["share"]},
                        {"alternatives", effect["alternatives"]}});
-  return {{"verdict", result["verdict"]},
-          {"verdict_title", result["verdict_title"]},
-          {"gap", result["gap"]},
-          {"effects", effects},
-          {"shrinkage", result["shrinkage"]}};
+  Json summary{{"effects", std::move(effects)}};
+  for (const char* name : {"verdict", "verdict_title", "gap", "shrinkage"}) summary[name] = result[name];
+  return summary;
 }
 
 // Spread evenly over the missions: every 1/share-th, one at least of three or more.

@@ -23,10 +23,6 @@ constexpr std::size_t least_coded_bytes = 1024;
 // How long a browser may cache the answer to a preflight request.
 constexpr const char* preflight_age_s = "600";
 
-bool is_json(const Response& response) {
-  return response.content_type.starts_with("application/json");
-}
-
 std::string& own_body(Response& response) {
   if (response.shared_body) response.body = *std::exchange(response.shared_body, nullptr);
   return response.body;
@@ -166,18 +162,13 @@ class CodedStream final : public StreamSource {
   std::string piece_;
 };
 
-// gzip (RFC 1952) at its smallest, for bodies that are coded once and sent often.
-std::string gzip_smallest(std::string_view bytes) {
-  GzipCoder coder(Z_BEST_COMPRESSION);
-  return all_of(coder, bytes);
-}
-
 }  // namespace
 
 void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io) {
   if (response.status != endpoint.success_status || !response.header("Content-Encoding").empty()) return;
   std::string vary = endpoint.csv ? "Accept" : "";
-  if (endpoint.rounded && is_json(response) && !response.stream) round(request, response);
+  if (endpoint.rounded && response.content_type.starts_with("application/json") && !response.stream)
+    round(request, response);
   const bool known = endpoint.etag && !response.stream && tag(request, response);
   const bool large = response.stream || body_of(response).size() >= least_coded_bytes;
   if (!on_io && endpoint.response_type != "text/event-stream" && large) {
@@ -192,7 +183,8 @@ Asset::Asset(std::string bytes, std::string content_type, std::string cache_cont
   plain_tag_ = entity_tag(bytes).substr(2);  // one form, one tag: strong
   gzipped_tag_ = plain_tag_;
   gzipped_tag_.insert(gzipped_tag_.size() - 1, "-gzip");
-  std::string small = gzip_smallest(bytes);
+  GzipCoder coder(Z_BEST_COMPRESSION);  // coded once and sent often
+  std::string small = all_of(coder, bytes);
   if (!small.empty() && small.size() < bytes.size())
     gzipped_ = std::make_shared<const std::string>(std::move(small));
   plain_ = std::make_shared<const std::string>(std::move(bytes));

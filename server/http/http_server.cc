@@ -31,11 +31,6 @@ std::int64_t milliseconds_now() {
   return std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now().time_since_epoch()).count();
 }
 
-ServerObserver& nobody() {
-  static ServerObserver observer;
-  return observer;
-}
-
 }  // namespace
 
 std::string_view to_string(Refusal refusal) {
@@ -207,7 +202,8 @@ bool HttpServer::Impl::settled() {
 
 Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, const Router& router,
                                                       ServerObserver* observer) {
-  auto impl = std::make_unique<Impl>(options, router, observer != nullptr ? *observer : nobody());
+  static ServerObserver nobody;
+  auto impl = std::make_unique<Impl>(options, router, observer != nullptr ? *observer : nobody);
   TRY(impl->open());
   impl->run();
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));

@@ -26,11 +26,17 @@ const auto version_table =
         .value("version", AT(version), "of the program", {{"pattern", R"(^[0-9]+\.[0-9]+\.[0-9]+)"}})
         .value("compiler", AT(compiler), "compiler of the program");
 
-std::vector<std::string> refusal_names() {
-  std::vector<std::string> names;
+// Upper bounds for request durations.
+const std::vector<double> bounds_s{50e-6, 100e-6, 250e-6, 500e-6, 1e-3, 2.5e-3, 5e-3, 10e-3,
+                                   25e-3, 50e-3,  100e-3, 250e-3, 0.5,  1.0,    2.5,  10.0};
+
+std::vector<prometheus::Counter*> refusal_counters(Metrics& metrics) {
+  std::vector<prometheus::Counter*> made;
   for (unsigned i = 0; i < static_cast<unsigned>(Refusal::count_); ++i)
-    names.emplace_back(to_string(static_cast<Refusal>(i)));
-  return names;
+    made.push_back(&metrics.counter("joulecast_http_refused_total",
+                                    "Requests or connections that the server ended on its own, by reason",
+                                    {{"reason", std::string(to_string(static_cast<Refusal>(i)))}}));
+  return made;
 }
 
 }  // namespace
@@ -123,9 +129,7 @@ Endpoint events_endpoint(EventHub& hub) {
 
 HttpMetrics::HttpMetrics(Metrics& metrics)
     : metrics_(metrics),
-      refusals_(metrics.counters("joulecast_http_refused_total",
-                                 "Requests or connections that the server ended on its own, by reason",
-                                 "reason", refusal_names())),
+      refusals_(refusal_counters(metrics)),
       sent_bytes_(metrics.counter("joulecast_http_sent_bytes_total", "Bytes of answers")),
       received_bytes_(metrics.counter("joulecast_http_received_bytes_total", "Bytes of requests")) {
   metrics.series([this]() -> std::vector<Metrics::Series> {
@@ -142,8 +146,8 @@ void HttpMetrics::exchanged(const Exchange& exchange) {
                           {{"operation", operation}, {"code", std::to_string(exchange.status)}});
     place->second.duration =
         &metrics_.histogram("joulecast_http_request_duration_seconds",
-                            "From the last byte of a request to the last byte of its answer",
-                            Metrics::request_seconds(), {{"operation", operation}});
+                            "From the last byte of a request to the last byte of its answer", bounds_s,
+                            {{"operation", operation}});
   }
   place->second.requests->Increment();
   if (!exchange.stream) place->second.duration->Observe(exchange.duration_s);

@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <sstream>
 #include <utility>
 
+#include "base/text_file.h"
 #include "server/http/delivery.h"
 
 namespace joulecast::http {
@@ -102,11 +101,9 @@ Result<std::vector<Endpoint>> asset_endpoints_from(const std::string& directory)
   std::sort(paths.begin(), paths.end());
   std::vector<Endpoint> endpoints;
   for (const fs::path& path : paths) {
-    std::ifstream file(path, std::ios::binary);
-    std::ostringstream bytes;
-    if (fs::file_size(path, error) > 0 && (!file || !(bytes << file.rdbuf())))
-      return fail(Fault::not_found, "http.web_directory", "cannot read " + path.string());
-    add_endpoints(endpoints, path.filename().string(), std::move(bytes).str());
+    Result<std::string> bytes = read_text_file(path, std::string::npos);
+    if (!bytes) return fail(Fault::not_found, "http.web_directory", "cannot read " + path.string());
+    add_endpoints(endpoints, path.filename().string(), std::move(*bytes));
   }
   return endpoints;
 }
