@@ -33,10 +33,7 @@ Fleet::Fleet(const std::vector<SimulationSpec>& specs, std::uint64_t seed) {
   for (std::size_t k = 0; k < specs.size(); ++k)
     robots_.emplace_back(specs[k], Rng::stream(seed, 1000 + k).next());
   open_.resize(robots_.size());
-  for (auto& robot : robots_) {
-    Emission first;
-    waiting_.push_back(robot.next(first) ? std::optional(std::move(first)) : std::nullopt);
-  }
+  for (auto& robot : robots_) waiting_.push_back(robot.next());
 }
 
 std::optional<Fleet::Message> Fleet::next() {
@@ -51,9 +48,7 @@ std::optional<Fleet::Message> Fleet::next() {
   } else if (open) {
     open->utime_us = message.emission.utime_us;
   }
-  Emission following;
-  waiting_[*earliest] =
-      robots_[*earliest].next(following) ? std::optional(std::move(following)) : std::nullopt;
+  waiting_[*earliest] = robots_[*earliest].next();
   return message;
 }
 

@@ -53,14 +53,14 @@ VirtualRobot::VirtualRobot(const SimulationSpec& spec, std::uint64_t seed)
   history_.fill(electrical());
 }
 
-bool VirtualRobot::next(Emission& out) {
+std::optional<Emission> VirtualRobot::next() {
   while (outbox_.empty()) {
-    if (!under_way_ && spec_.missions != 0 && missions_begun_ >= spec_.missions) return false;
+    if (!under_way_ && spec_.missions != 0 && missions_begun_ >= spec_.missions) return std::nullopt;
     run_period();
   }
-  out = std::move(outbox_.front());
+  std::optional<Emission> next = std::move(outbox_.front());
   outbox_.pop_front();
-  return true;
+  return next;
 }
 
 std::int64_t VirtualRobot::now_us() const {

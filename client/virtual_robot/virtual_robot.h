@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -78,8 +79,8 @@ class VirtualRobot {
  public:
   VirtualRobot(const SimulationSpec& spec, std::uint64_t seed);
 
-  // Runs to the next message. False when the last mission is over.
-  bool next(Emission& out);
+  // Runs to the next message. Empty when the last mission is over.
+  std::optional<Emission> next();
 
   const Witness& witness() const { return witness_; }
   // Missions that are over, in order.

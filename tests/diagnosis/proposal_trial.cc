@@ -92,15 +92,14 @@ json run(const Trial& trial, std::uint64_t seed) {
     spec.initial_charge = charge;
     if (changed) spec.imperfections = virtual_robot::make_imperfections(trial.effects).value();
     virtual_robot::VirtualRobot machine(spec, 2 * seed + (changed ? 1 : 0));
-    virtual_robot::Emission emission;
-    while (machine.next(emission)) {
-      last_us = emission.utime_us;
+    while (auto emission = machine.next()) {
+      last_us = emission->utime_us;
       std::visit(
           [&](auto& message) {
-            harness.pipeline->handle({robot.robot_id, message, emission.utime_us});
+            harness.pipeline->handle({robot.robot_id, message, emission->utime_us});
           },
-          emission.message);
-      const auto* event = std::get_if<signals::MissionEvent>(&emission.message);
+          emission->message);
+      const auto* event = std::get_if<signals::MissionEvent>(&emission->message);
       if (event != nullptr && event->phase != signals::MissionPhase::started) end_mission();
     }
     charge = machine.state_of_charge();

@@ -31,15 +31,14 @@ virtual_robot::SimulationSpec rubbing(std::string_view robot_json) {
 // Handles all messages of the robot; `ended` follows each mission, with its number from 1.
 void drive(testing::PipelineHarness& harness, const std::string& robot_id,
            virtual_robot::VirtualRobot& machine, const std::function<void(int)>& ended) {
-  virtual_robot::Emission emission;
   int missions = 0;
-  while (machine.next(emission)) {
+  while (auto emission = machine.next()) {
     std::visit(
         [&](auto& message) {
-          harness.pipeline->handle({robot_id, message, emission.utime_us});
+          harness.pipeline->handle({robot_id, message, emission->utime_us});
         },
-        emission.message);
-    if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
+        emission->message);
+    if (const auto* event = std::get_if<signals::MissionEvent>(&emission->message))
       if (event->phase != signals::MissionPhase::started) ended(++missions);
   }
 }

@@ -28,12 +28,11 @@ struct Case {
 std::vector<telemetry::Recording> power_drive(const virtual_robot::SimulationSpec& spec, std::uint64_t seed) {
   std::vector<telemetry::Recording> missions;
   virtual_robot::VirtualRobot machine(spec, seed);
-  virtual_robot::Emission emission;
   bool under_way = false;
-  while (machine.next(emission)) {
-    if (const auto* sample = std::get_if<signals::Sample>(&emission.message)) {
+  while (auto emission = machine.next()) {
+    if (const auto* sample = std::get_if<signals::Sample>(&emission->message)) {
       if (under_way) missions.back().samples.push_back(*sample);
-    } else if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message)) {
+    } else if (const auto* event = std::get_if<signals::MissionEvent>(&emission->message)) {
       under_way = event->phase == signals::MissionPhase::started;
       if (under_way) missions.push_back({spec.robot.robot_id, event->mission_id, event->payload_kg, {}});
     }

@@ -78,11 +78,10 @@ History work(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed, con
   if (c.mass != 0) refinement.restart(0, true);
   DriveEquations equations = DriveEquations::make(robot).value();
   virtual_robot::VirtualRobot machine(spec, seed);
-  virtual_robot::Emission emission;
-  while (machine.next(emission)) {
-    if (const auto* sample = std::get_if<signals::Sample>(&emission.message)) {
+  while (auto emission = machine.next()) {
+    if (const auto* sample = std::get_if<signals::Sample>(&emission->message)) {
       equations.add(*sample);
-    } else if (const auto& event = std::get<signals::MissionEvent>(emission.message);
+    } else if (const auto& event = std::get<signals::MissionEvent>(emission->message);
                event.phase != signals::MissionPhase::started) {
       const auto of_mission = equations.take();
       out.findings.push_back(refinement.judge(of_mission, equations.mean_payload_kg(), event.utime_us, true));

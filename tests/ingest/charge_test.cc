@@ -59,20 +59,19 @@ Followed follow(const std::string& kind, bool calibrated, double charge, double 
     EXPECT_TRUE(harness.store->apply({&stored, 1}));
   }
   virtual_robot::VirtualRobot robot(spec, seed);
-  virtual_robot::Emission emission;
   Followed out;
   double square = 0, normalised = 0, count = 0;
-  while (robot.next(emission)) {
+  while (auto emission = robot.next()) {
     std::visit(
         [&](auto& message) {
-          harness.pipeline->handle({model.robot_id, message, emission.utime_us});
+          harness.pipeline->handle({model.robot_id, message, emission->utime_us});
         },
-        emission.message);
-    if (!std::holds_alternative<signals::Sample>(emission.message)) continue;
+        emission->message);
+    if (!std::holds_alternative<signals::Sample>(emission->message)) continue;
     harness.pipeline->publish();
     const auto snapshot = harness.fleet.find(model.robot_id);
     const double error = snapshot->state_of_charge - robot.state_of_charge();
-    const double since_s = 1e-6 * static_cast<double>(emission.utime_us - spec.start_utime_us);
+    const double since_s = 1e-6 * static_cast<double>(emission->utime_us - spec.start_utime_us);
     if (!std::isfinite(error)) continue;
     if (std::fabs(error) > 0.05) out.settled_s = since_s;
     if (since_s < 300) continue;
@@ -137,7 +136,6 @@ TEST(ChargingOfVirtualRobots, IsAccountedApartAndForecast) {
   PipelineHarness harness;
   harness.add_robot(model);
   virtual_robot::VirtualRobot robot(spec, 3);
-  virtual_robot::Emission emission;
   struct Forecast {
     std::int64_t utime_us;
     double duration_s, sd_s, charge;
@@ -145,19 +143,19 @@ TEST(ChargingOfVirtualRobots, IsAccountedApartAndForecast) {
   std::vector<Forecast> forecasts;
   std::vector<double> misses, normalised;
   bool was_charging = false, restarted = false;
-  while (robot.next(emission)) {
+  while (auto emission = robot.next()) {
     std::visit(
         [&](auto& message) {
-          harness.pipeline->handle({"amr", message, emission.utime_us});
+          harness.pipeline->handle({"amr", message, emission->utime_us});
         },
-        emission.message);
+        emission->message);
     harness.pipeline->publish();
     const auto snapshot = harness.fleet.find("amr");
     if (snapshot == nullptr) continue;
     const bool charging = snapshot->charge.phase == battery::ChargingPhase::constant_current ||
                           snapshot->charge.phase == battery::ChargingPhase::taper;
     if (charging && std::isfinite(snapshot->charge.to_full.duration_s))
-      forecasts.push_back({emission.utime_us, snapshot->charge.to_full.duration_s,
+      forecasts.push_back({emission->utime_us, snapshot->charge.to_full.duration_s,
                            snapshot->charge.to_full.sd_s, robot.state_of_charge()});
     if (was_charging && !charging && !forecasts.empty()) {
       const std::int64_t end_us = forecasts.back().utime_us;

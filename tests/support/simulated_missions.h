@@ -32,14 +32,13 @@ inline Simulation simulate_missions(const SimulationSpec& spec, std::uint64_t se
   assert(spec.missions > 0);
   Simulation out;
   VirtualRobot robot(spec, seed);
-  Emission emission;
-  while (robot.next(emission)) {
-    if (auto* event = std::get_if<signals::MissionEvent>(&emission.message)) {
+  while (auto emission = robot.next()) {
+    if (auto* event = std::get_if<signals::MissionEvent>(&emission->message)) {
       out.events.push_back(std::move(*event));
-    } else if (auto* covariates = std::get_if<signals::CovariateMessage>(&emission.message)) {
+    } else if (auto* covariates = std::get_if<signals::CovariateMessage>(&emission->message)) {
       out.covariates.push_back(std::move(*covariates));
     } else {
-      out.samples.push_back(std::get<signals::Sample>(emission.message));
+      out.samples.push_back(std::get<signals::Sample>(emission->message));
     }
   }
   out.truth = {spec.robot.robot_id, seed, effects_of(spec.imperfections), spec.world, robot.finished()};
@@ -92,9 +91,8 @@ struct GapIntegrals {
 inline GapIntegrals integrate(const SimulationSpec& spec, std::uint64_t seed) {
   GapIntegrals sums;
   VirtualRobot robot(spec, seed);
-  Emission emission;
-  while (robot.next(emission)) {
-    if (!std::holds_alternative<signals::Sample>(emission.message)) continue;
+  while (auto emission = robot.next()) {
+    if (!std::holds_alternative<signals::Sample>(emission->message)) continue;
     const Witness& seen = robot.witness();
     const double measured = seen.reading.battery_voltage_v * seen.reading.battery_current_a;
     const double nominal = nominal_power_w(spec.robot, seen.reading.wheel_speed_rad_s,

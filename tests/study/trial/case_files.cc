@@ -95,17 +95,16 @@ Result<void> write_log(const TrialCase& c, const std::filesystem::path& path) {
   auto log = telemetry::EventLogWriter::create(path.string());
   if (!log) return tl::unexpected(log.error());
   vr::VirtualRobot robot(c.spec, c.seed);
-  vr::Emission emission;
-  while (robot.next(emission)) {
-    const auto* sample = std::get_if<signals::Sample>(&emission.message);
+  while (auto emission = robot.next()) {
+    const auto* sample = std::get_if<signals::Sample>(&emission->message);
     const std::string& id = robot.robot_id();
     const auto bytes = sample != nullptr ? telemetry::encode_telemetry(id, *sample)
                                          : telemetry::encode_mission_event(
-                                               id, std::get<signals::MissionEvent>(emission.message));
+                                               id, std::get<signals::MissionEvent>(emission->message));
     if (!bytes) return tl::unexpected(bytes.error());
     const auto subject =
         sample != nullptr ? telemetry::Subject::telemetry : telemetry::Subject::mission_event;
-    if (auto done = log->write(emission.utime_us, telemetry::channel_of(subject, id), *bytes); !done) {
+    if (auto done = log->write(emission->utime_us, telemetry::channel_of(subject, id), *bytes); !done) {
       return done;
     }
   }
