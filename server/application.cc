@@ -143,7 +143,7 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
   const auto add = [&table](std::vector<http::Endpoint> rows) {
     table.insert(table.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
   };
-  for (http::Endpoint& row : api::endpoints(services))
+  for (http::Endpoint& row : api::endpoints(&services))
     table.push_back(gate.audited(keys.honoured(std::move(row))));
   add(gate.session_endpoints());
   add({http::events_endpoint(events)});
@@ -685,7 +685,7 @@ Result<std::string> store_file(const DaemonOptions& options) {
 Result<std::string> openapi_document() {
   Metrics metrics;
   http::EventHub events;
-  std::vector<http::Endpoint> table = api::described_endpoints();
+  std::vector<http::Endpoint> table = api::endpoints(nullptr);
   TRY_ASSIGN(const auto gate, http::Gate::open({}));
   for (http::Endpoint& row : gate->session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));

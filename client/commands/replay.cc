@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <set>
 #include <string>
 #include <utility>
@@ -41,12 +42,6 @@ struct ReplayOptions {
   std::string unit = energy_units.front();
   bool json = false;
 };
-
-// Reports on standard error where and how a log is damaged.
-void tell_damage(const std::string& path, const telemetry::LogRead& place) {
-  std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
-               static_cast<unsigned long long>(place.offset), place.message.c_str());
-}
 
 // When each message may go: by the log's own clock, and never faster than the ceiling. LCM has no flow
 // control, so without a ceiling a receiver loses messages and neither side notices.
@@ -86,33 +81,18 @@ class Pacer {
   Clock::time_point earliest_;
 };
 
-// Publishes the log; false when interrupted.
-Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer& pacer,
-                        InterruptGuard& interrupt, LogProgress& progress, telemetry::LogTally& tally) {
-  pacer.begin_log();
-  const auto publish = [&](const telemetry::LogEvent& event) -> Result<bool> {
-    // Waits shorter than the scheduler's grain are left to add up.
-    const auto due = pacer.due(event.timestamp_us);
-    if (due > Clock::now() + std::chrono::microseconds(200) || tally.events % 64 == 0)
-      if (interrupt.wait_until(due)) return false;
-    TRY(link.publish(std::string(event.channel), event.data));
-    progress.passed(event);
-    return true;
+// Reads a log until `take` returns false, and reports on standard error where and how it is damaged.
+Result<bool> read_log(const std::string& path, LogProgress& progress, telemetry::LogTally& tally,
+                      const std::function<Result<bool>(const telemetry::LogEvent&)>& take) {
+  const auto take_and_count = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    TRY_ASSIGN(const bool taken, take(event));
+    if (taken) progress.passed(event);
+    return taken;
   };
-  return telemetry::read_events(path, publish, tally,
-                                [&](const telemetry::LogRead& place) { tell_damage(path, place); });
-}
-
-Result<bool> read_log(const std::string& path, ingest::Pipeline& pipeline, ingest::IngestCounters& counters,
-                      LogProgress& progress, telemetry::LogTally& tally) {
-  const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
-    if (const auto message = ingest::decode_message(event.channel, event.data, event.timestamp_us, counters))
-      pipeline.handle(*message);
-    progress.passed(event);
-    return true;
-  };
-  return telemetry::read_events(path, take, tally,
-                                [&](const telemetry::LogRead& place) { tell_damage(path, place); });
+  return telemetry::read_events(path, take_and_count, tally, [&](const telemetry::LogRead& place) {
+    std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
+                 static_cast<unsigned long long>(place.offset), place.message.c_str());
+  });
 }
 
 // The document of the missions of logs (--json).
@@ -205,7 +185,12 @@ Result<Exit> replay_into(const ReplayOptions& options) {
   telemetry::LogTally tally;
   LogProgress progress("accounting", options.logs);
   const auto began = Clock::now();
-  for (const std::string& log : options.logs) TRY(read_log(log, pipeline, counters, progress, tally));
+  const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    if (const auto message = ingest::decode_message(event.channel, event.data, event.timestamp_us, counters))
+      pipeline.handle(*message);
+    return true;
+  };
+  for (const std::string& log : options.logs) TRY(read_log(log, progress, tally, take));
   TRY(telemetry::need_robots(options.logs.front(), tally));
   pipeline.finish();
   TRY(writer.flush());
@@ -234,8 +219,17 @@ Result<Exit> run_replay(ReplayOptions& options) {
   telemetry::LogTally tally;
   LogProgress progress("replaying", options.logs);
   const auto began = Clock::now();
+  const auto publish = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    // Waits shorter than the scheduler's grain are left to add up.
+    const auto due = pacer.due(event.timestamp_us);
+    if (due > Clock::now() + std::chrono::microseconds(200) || tally.events % 64 == 0)
+      if (interrupt.wait_until(due)) return false;
+    TRY(link.publish(std::string(event.channel), event.data));
+    return true;
+  };
   for (const auto& path : options.logs) {
-    TRY_ASSIGN(const bool finished, replay_log(path, link, pacer, interrupt, progress, tally));
+    pacer.begin_log();
+    TRY_ASSIGN(const bool finished, read_log(path, progress, tally, publish));
     if (!finished) break;
   }
   if (tally.events > 0) TRY(telemetry::need_robots(options.logs.front(), tally));

@@ -49,7 +49,7 @@ struct SimulateOptions : vr::ScriptOptions, vr::Charger, vr::SensorSuite {
   }
   std::optional<std::size_t> robots;
   std::uint64_t seed = 1;
-  std::optional<std::string> lcm_url;
+  std::optional<std::string> lcm_url;  // absent: only the log is written
   std::string log, truth, key_file, server;
   std::string start = "2023-11-14T22:13:20Z";  // used only for logs
   double rate_hz = 50, speed = 1, run_s = 0, scatter = 1, initial_charge = 0.8;
@@ -204,8 +204,8 @@ Result<void> write_truth(const SimulateOptions& options, const std::vector<Fleet
 
 // Of missions in order of time: when they are run by the clock, the UTC second at which they start; in a log,
 // which comes out the same again, the seed.
-std::string name_of_run(const SimulateOptions& options, bool over_lcm, std::int64_t start_us) {
-  if (!over_lcm) return "s" + std::to_string(options.seed);
+std::string name_of_run(const SimulateOptions& options, std::int64_t start_us) {
+  if (!options.lcm_url) return "s" + std::to_string(options.seed);
   return format_utc(start_us, "%y%m%d-%H%M%S");
 }
 
@@ -218,7 +218,8 @@ double length_s(const std::vector<vr::SimulationSpec>& specs, const SimulateOpti
   return 1e-6 * static_cast<double>(last_us - specs.front().start_utime_us);
 }
 
-Result<void> check_options(const SimulateOptions& options, bool over_lcm) {
+Result<void> check_options(const SimulateOptions& options) {
+  const bool over_lcm = options.lcm_url.has_value();
   const bool endless = options.run_s == 0 && options.missions == 0;
   if (!over_lcm && endless) return invalid("--log", "a log needs an end: give --duration or --missions");
   if (over_lcm && options.speed == 0)
@@ -232,14 +233,14 @@ Result<void> check_options(const SimulateOptions& options, bool over_lcm) {
   return {};
 }
 
-Result<Outlets> open_outlets(const SimulateOptions& options, bool over_lcm) {
+Result<Outlets> open_outlets(const SimulateOptions& options) {
   Outlets outlets;
   if (!options.log.empty()) {
     TRY_ASSIGN(auto file, OutputFile::create(options.log, existing(options.force)));
     TRY_ASSIGN(outlets.log, telemetry::EventLogWriter::create(file.written_to()));
     outlets.log_file.emplace(std::move(file));
   }
-  if (over_lcm) {
+  if (options.lcm_url) {
     TRY_ASSIGN(outlets.link, telemetry::LcmLink::open(*options.lcm_url));
   }
   if (!options.key_file.empty()) {
@@ -249,19 +250,17 @@ Result<Outlets> open_outlets(const SimulateOptions& options, bool over_lcm) {
 }
 
 std::vector<vr::SimulationSpec> timed_specs(const std::vector<FleetMember>& members,
-                                            const SimulateOptions& options, std::int64_t log_start_utime_us,
-                                            bool over_lcm) {
+                                            const SimulateOptions& options, std::int64_t start_us) {
   std::vector<vr::SimulationSpec> specs;
   for (const FleetMember& member : members) specs.push_back(member.spec);
-  std::int64_t start_us = log_start_utime_us;
-  if (over_lcm) {
+  if (options.lcm_url) {
     // Robots with a faster clock start in the past, so that their last stamp is the time at which it is sent.
     const double ahead_s = options.speed > 1 ? (1 - 1 / options.speed) * length_s(specs, options) : 0;
     start_us = host_utime_us() - std::llround(1e6 * ahead_s);
   }
   for (vr::SimulationSpec& spec : specs) {
     spec.start_utime_us = start_us;
-    spec.run = name_of_run(options, over_lcm, start_us);
+    spec.run = name_of_run(options, start_us);
   }
   return specs;
 }
@@ -311,15 +310,15 @@ Result<Published> publish(vr::Fleet& fleet, std::int64_t start_us, const Simulat
   return sent;
 }
 
-Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
-  TRY(check_options(options, over_lcm));
+Result<void> run_simulate(const SimulateOptions& options) {
+  TRY(check_options(options));
   TRY_ASSIGN(const auto start_utime_us, parse_time(options.start, "--start"));
   TRY_ASSIGN(auto members, assemble(options));
-  TRY_ASSIGN(auto outlets, open_outlets(options, over_lcm));
+  TRY_ASSIGN(auto outlets, open_outlets(options));
   if (!options.server.empty()) TRY(introduce(members, options.server));
-  const std::vector<vr::SimulationSpec> specs = timed_specs(members, options, start_utime_us, over_lcm);
+  const std::vector<vr::SimulationSpec> specs = timed_specs(members, options, start_utime_us);
   vr::Fleet fleet(specs, options.seed);
-  if (!options.quiet && over_lcm) announce(specs, *options.lcm_url);
+  if (!options.quiet && options.lcm_url) announce(specs, *options.lcm_url);
   const auto began = Clock::now();
   TRY_ASSIGN(const auto sent, publish(fleet, specs.front().start_utime_us, options, outlets));
   TRY(write_truth(options, members, fleet));
@@ -342,9 +341,8 @@ Result<Exit> simulate(SimulateOptions& options) {
   constexpr std::size_t usual_robots = 4;
   if (!options.robots)
     options.robots = options.robot_files.empty() ? usual_robots : options.robot_files.size();
-  const bool over_lcm = options.log.empty() || options.lcm_url;
-  if (!options.lcm_url) options.lcm_url = usual_lcm_url();
-  TRY(run_simulate(options, over_lcm));
+  if (options.log.empty() && !options.lcm_url) options.lcm_url = usual_lcm_url();
+  TRY(run_simulate(options));
   return Exit::ok;
 }
 

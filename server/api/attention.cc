@@ -44,6 +44,12 @@ constexpr AttentionKind kinds[] = {{"contradicted", "", "contradiction_ended"},
                                    {"store"},
                                    {"cluster"}};
 
+std::vector<std::string_view> attention_kinds() {
+  std::vector<std::string_view> names;
+  for (const AttentionKind& kind : kinds) names.push_back(kind.name);
+  return names;
+}
+
 // By which reasons are in order.
 std::pair<bool, Severity> urgency(const AttentionReason& r) {
   return {r.acknowledged.has_value(), r.severity};
@@ -281,12 +287,6 @@ Result<Response> acknowledge(const Services& services, const Request& request) {
 }
 
 }  // namespace
-
-std::vector<std::string_view> attention_kinds() {
-  std::vector<std::string_view> names;
-  for (const AttentionKind& kind : kinds) names.push_back(kind.name);
-  return names;
-}
 
 void AttentionList::start() {
   thread_ = std::jthread([this](const std::stop_token& stop) {

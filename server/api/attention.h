@@ -32,7 +32,7 @@ struct Acknowledgement {
 
 // A condition that a person should act on, present now.
 struct AttentionReason {
-  std::string kind;  // one of attention_kinds()
+  std::string kind;  // one of attention.cc's kinds
   Severity severity = Severity::notice;
   std::optional<std::int64_t> since_utime_us;  // absent if unknown
   std::string message;                         // one sentence: the condition with its number
@@ -47,8 +47,6 @@ struct AttentionEntry {
   std::string robot_id;                  // empty: the service itself
   std::vector<AttentionReason> reasons;  // at least one; unacknowledged ones first, then the most urgent
 };
-
-std::vector<std::string_view> attention_kinds();
 
 // Everything that needs attention now: contradicted telemetry, silence that began during a mission, charge
 // below the file's reserve, a missing robot file, drift, departure from robots of the same kind, an effect

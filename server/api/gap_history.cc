@@ -69,7 +69,7 @@ const auto ratio_table =
         .value("model_version", AT(model_version), version_words)
         .value("measured_j", AT(measured_j), "energy from the battery by the sensors of voltage and current")
         .value("modelled_j", AT(modelled_j), "where measured")
-        .value("ratio", AT(ratio), "measured / modelled");
+        .value("ratio", AT(ratio()), "measured / modelled");
 
 const auto sibling_table =
     Table<drift::SiblingRatio>()

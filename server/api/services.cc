@@ -1,7 +1,5 @@
 #include "server/api/services.h"
 
-#include <iterator>
-
 #include "answers/autonomy.h"
 #include "answers/estimate.h"
 #include "answers/matrix.h"
@@ -27,33 +25,19 @@ constexpr std::pair<const char*, Part (*)()> parts[] = {
     {"missions", mission_list_part}, {"missions", mission_part},    {"missions", mission_request_part},
     {"missions", floor_map_part},    {"planning", planning_part},   {"maps", map_part}};
 
-std::vector<TableRow> table() {
-  std::vector<TableRow> all;
-  for (const auto& [tag, part] : parts) {
-    Rows rows = part().rows;
-    for (TableRow& row : rows) {
-      row.endpoint.tag = tag;
-      if (row.endpoint.rounded) row.endpoint.parameters.push_back(digits_parameter());
-    }
-    all.insert(all.end(), std::make_move_iterator(rows.begin()), std::make_move_iterator(rows.end()));
-  }
-  return all;
-}
-
 }  // namespace
 
-std::vector<http::Endpoint> endpoints(Services& services) {
+std::vector<http::Endpoint> endpoints(Services* services) {
   std::vector<http::Endpoint> all;
-  for (TableRow& row : table()) {
-    row.bind(services, row.endpoint);
-    all.push_back(std::move(row.endpoint));
+  for (const auto& [tag, part] : parts) {
+    Rows rows = part().rows;
+    for (auto& [endpoint, bind] : rows) {
+      endpoint.tag = tag;
+      if (endpoint.rounded) endpoint.parameters.push_back(digits_parameter());
+      if (services != nullptr) bind(*services, endpoint);
+      all.push_back(std::move(endpoint));
+    }
   }
-  return all;
-}
-
-std::vector<http::Endpoint> described_endpoints() {
-  std::vector<http::Endpoint> all;
-  for (TableRow& row : table()) all.push_back(std::move(row.endpoint));
   return all;
 }
 

@@ -90,10 +90,9 @@ struct Rows : std::vector<TableRow> {
   }
 };
 
-// All endpoints of the API, except those of operations (server/http).
-std::vector<http::Endpoint> endpoints(Services& services);
-// The same without handlers, for generated documents.
-std::vector<http::Endpoint> described_endpoints();
+// All endpoints of the API, except those of operations (server/http). Null: without handlers, for generated
+// documents.
+std::vector<http::Endpoint> endpoints(Services* services);
 // The schemas of all endpoints.
 described::Schemas schemas();
 

@@ -44,7 +44,7 @@ std::string header(const Response& response, std::string_view name) {
 
 // Every endpoint of the daemon. Handlers that need a fleet are replaced by ones that return 200.
 std::vector<Endpoint> whole_table(Metrics& metrics, EventHub& events) {
-  std::vector<Endpoint> table = api::described_endpoints();
+  std::vector<Endpoint> table = api::endpoints(nullptr);
   table.push_back(events_endpoint(events));
   for (Endpoint& row : operations_endpoints(metrics, {})) table.push_back(std::move(row));
   table = *with_openapi(std::move(table), api::schemas(), embedded_examples());
@@ -198,8 +198,8 @@ TEST_F(AccessTest, EndpointWithoutRoleIsRejected) {
 
 TEST_F(AccessTest, DocumentStatesRoles) {
   const json document =
-      json::parse(*openapi_document(api::described_endpoints(), api::schemas(), embedded_examples()));
-  for (const Endpoint& row : api::described_endpoints()) {
+      json::parse(*openapi_document(api::endpoints(nullptr), api::schemas(), embedded_examples()));
+  for (const Endpoint& row : api::endpoints(nullptr)) {
     std::string method(to_string(row.method));
     for (char& c : method) c = static_cast<char>(c - 'A' + 'a');
     const json roles = json::array({access::name(row.role)});
