@@ -4,9 +4,9 @@ export const sessionPath = '/v1/session';
 
 // An error response of the service; status 0: no connection.
 class Problem extends Error {
-  constructor(status, title, detail, field) {
+  constructor(status, title, detail, body = {}) {
     super(detail || title);
-    Object.assign(this, { status, title, detail, field });
+    Object.assign(this, { status, title, body, field: body.field });
   }
 }
 
@@ -29,10 +29,7 @@ async function answer(response) {
     askToSignIn();
     throw new Problem(401, 'You are not signed in', 'Sign in to see the fleet.');
   }
-  throw Object.assign(
-    new Problem(response.status, problem.title ?? response.statusText, problem.detail ?? '', problem.field),
-    { body: problem },
-  );
+  throw new Problem(response.status, problem.title ?? response.statusText, problem.detail, problem);
 }
 
 async function call(path, options) {
@@ -127,8 +124,9 @@ export const delayed = (read, ms) => async (signal) => {
   return read(signal);
 };
 
-// The newest map that `read(signal)` resolves to; empty at first. It is read after the first view is drawn,
-// every `renewMs`, and when `key` changes; an empty key reads nothing. A failed request keeps the map: the
-// live view reports that the service is gone.
-const none = new Map();
-export const useRenewed = (read, renewMs, key) => useRead(delayed(read, 300), key, 0, renewMs).value ?? none;
+// The newest value that `read(signal)` resolves to; `none` at first, an empty map. It is read after the first
+// view is drawn, every `renewMs`, and when `key` changes; an empty key reads nothing. A failed request keeps
+// the value: the live view reports that the service is gone.
+const empty = new Map();
+export const useRenewed = (read, renewMs, key, none = empty) =>
+  useRead(delayed(read, 300), key, 0, renewMs).value ?? none;

@@ -141,21 +141,18 @@ const usual = {
 
 // `make(palette)` gives uPlot's options without width and height; called again when `changes`, the theme or
 // the unit of energy do.
-export function Chart({ make, data, height = 220, label, changes = [], onReady }) {
+export function Chart({ make, data, height = 220, label, changes = [] }) {
   const place = useRef(null);
   const plot = useRef(null);
-  const latest = useRef(data);
   const dark = useTheme();
   const loading = useRead(loadCharts, uPlot ? null : 'charts');
   const ready = uPlot !== null;
-  latest.current = data;
   useLayoutEffect(() => {
     if (!ready) return undefined;
     const width = () => Math.max(200, Math.floor(place.current.clientWidth));
     const options = { ...usual, ...make(palette()), width: width(), height };
-    const u = new uPlot(options, latest.current, place.current);
+    const u = new uPlot(options, data, place.current);
     plot.current = u;
-    onReady?.(u);
     const observer = new ResizeObserver(() => {
       if (width() !== u.width) u.setSize({ width: width(), height });
     });

@@ -2,17 +2,7 @@
 import { keptChoice } from './choice.js';
 import { digits, fixed, known, none } from './format.js';
 
-const units = {
-  Wh: [
-    ['Wh', 3600],
-    ['kWh', 3.6e6],
-  ],
-  J: [
-    ['J', 1],
-    ['kJ', 1e3],
-    ['MJ', 1e6],
-  ],
-};
+const units = { Wh: { Wh: 3600, kWh: 3.6e6 }, J: { J: 1, kJ: 1e3, MJ: 1e6 } };
 const choice = keptChoice('energy_unit', ['Wh', 'J'], () => 'Wh');
 
 export const energyUnit = choice.get;
@@ -28,7 +18,7 @@ export function energyScale(values, significant = 3) {
   const sizes = values.filter((v) => known(v) && v !== 0).map(Math.abs);
   sizes.sort((a, b) => a - b);
   const [middle = 0, largest = 0] = [sizes[sizes.length >> 1], sizes[sizes.length - 1]];
-  const all = units[choice.get()];
+  const all = Object.entries(units[choice.get()]);
   const [u, joule] = all.findLast(([, size]) => largest >= 0.9995 * size) ?? all[0];
   return { u, joule, places: decimals(middle / joule, significant) };
 }

@@ -45,22 +45,16 @@ export function strokeThrough(c, ...places) {
 
 // The transformation from the floor to the canvas.
 export function fit(points, width, height, margin = 28, leastM = 2) {
-  let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
-  for (const [x, y] of points) {
-    if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
-    x0 = Math.min(x0, x);
-    x1 = Math.max(x1, x);
-    y0 = Math.min(y0, y);
-    y1 = Math.max(y1, y);
-  }
-  if (x0 > x1) [x0, x1, y0, y1] = [-leastM, leastM, -leastM, leastM];
-  const scale = Math.min(
-    (width - 2 * margin) / Math.max(x1 - x0, leastM),
-    (height - 2 * margin) / Math.max(y1 - y0, leastM),
-  );
-  const cx = (x0 + x1) / 2;
-  const cy = (y0 + y1) / 2;
-  return viewOf(scale, cx, cy, width, height);
+  const placed = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
+  // The middle along an axis, and the scale at which the points fit there.
+  const along = (axis, pixels) => {
+    const values = placed.length > 0 ? placed.map((point) => point[axis]) : [-leastM, leastM];
+    const low = values.reduce((a, b) => Math.min(a, b));
+    const high = values.reduce((a, b) => Math.max(a, b));
+    return [(low + high) / 2, (pixels - 2 * margin) / Math.max(high - low, leastM)];
+  };
+  const [[cx, wide], [cy, tall]] = [along(0, width), along(1, height)];
+  return viewOf(Math.min(wide, tall), cx, cy, width, height);
 }
 
 export function viewOf(scale, cx, cy, width, height) {
@@ -252,33 +246,29 @@ export function FloorPath({
   kind = 'power',
   height = 380,
   label,
-  cursor = null,
-  robot = null,
-  legend = true,
+  cursor,
+  robot,
   ends = true,
-  under = null,
+  under,
 }) {
   const shown = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
   useTheme(); // the scale is of the theme
-  const scale = scaleFor(
-    kind,
-    shown.map((row) => row[2]),
-  );
+  const values = shown.map((row) => row[2]);
+  const scale = scaleFor(kind, values);
   const viewFor = (width, tall) =>
     fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
   const draw = (c, view) => {
-    if (under !== null) drawUnder(c, view, under);
+    if (under) drawUnder(c, view, under);
     c.lineWidth = 3.2;
     c.lineCap = 'round';
     c.lineJoin = 'round';
     for (let k = 1; k < shown.length; ++k) {
-      const value = shown[k][2];
-      c.strokeStyle = Number.isFinite(value) ? scale.colourOf(value) : palette().line;
+      c.strokeStyle = Number.isFinite(values[k]) ? scale.colourOf(values[k]) : palette().line;
       strokeThrough(c, ...view.to(...shown[k - 1]), ...view.to(...shown[k]));
     }
     if (shown.length > 1 && ends) drawEnds(c, view, shown);
-    if (robot) drawRobot(c, view, robot[0], robot[1], robot[2] ?? 0, palette().ink);
-    const at = cursor === null ? null : points[cursor];
+    if (robot) drawRobot(c, view, ...robot, palette().ink);
+    const at = points[cursor];
     if (at && Number.isFinite(at[0])) {
       const [px, py] = view.to(at[0], at[1]);
       c.strokeStyle = palette().ink;
@@ -296,7 +286,7 @@ export function FloorPath({
       aria-label={label}
       changes={[points, kind, cursor, robot, under]}
     >
-      {legend && shown.some((row) => row[2] > 0 || kind === 'gap') && (
+      {values.some((value) => value > 0 || kind === 'gap') && (
         <Legend scale={scale} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
       )}
     </FloorView>

@@ -1,5 +1,5 @@
 // Tables of records. On a narrow screen each row becomes a card, with the column's title next to each value.
-import { Panel, shown } from './widgets.jsx';
+import { Options, Panel, shown } from './widgets.jsx';
 
 export const names = new Intl.Collator('en', { numeric: true });
 
@@ -27,18 +27,6 @@ export function orderOf(given, change, usual) {
   return [sort, onSort];
 }
 
-function Title({ column, sort, onSort }) {
-  if (!onSort || !column.sort) return column.title;
-  return (
-    <button type="button" onClick={() => onSort(column.key)}>
-      {column.title}
-      <span class="arrow" aria-hidden="true">
-        {column.key === sort?.key ? (sort.down ? '▾' : '▴') : ''}
-      </span>
-    </button>
-  );
-}
-
 export function Head({ columns, sort, onSort }) {
   const direction = (c) => (c.key !== sort?.key ? undefined : sort.down ? 'descending' : 'ascending');
   return (
@@ -53,7 +41,16 @@ export function Head({ columns, sort, onSort }) {
             title={c.hint}
             aria-sort={direction(c)}
           >
-            <Title column={c} sort={sort} onSort={onSort} />
+            {onSort && c.sort ? (
+              <button type="button" onClick={() => onSort(c.key)}>
+                {c.title}
+                <span class="arrow" aria-hidden="true">
+                  {c.key === sort.key ? (sort.down ? '▾' : '▴') : ''}
+                </span>
+              </button>
+            ) : (
+              c.title
+            )}
           </th>
         ))}
       </tr>
@@ -63,17 +60,13 @@ export function Head({ columns, sort, onSort }) {
 
 // The choice of a table's order on narrow screens, which do not show the column titles.
 export function SortChoice({ columns, sort, onSort }) {
-  const sortable = columns.filter((c) => c.sort);
+  const sortable = columns.filter((c) => c.sort).map((c) => [c.key, c.title]);
   return (
     <span class="sort-choice">
       <label class="row with-unit">
         <span class="note">Sort by</span>
         <select value={sort.key} onChange={(event) => onSort(event.currentTarget.value)}>
-          {sortable.map((c) => (
-            <option key={c.key} value={c.key}>
-              {c.title}
-            </option>
-          ))}
+          <Options of={sortable} />
         </select>
       </label>
       <button type="button" onClick={() => onSort(sort.key)}>

@@ -5,10 +5,7 @@ import { digits, fixed, known } from './format.js';
 const none = { price_per_kwh: null, co2_g_per_kwh: null };
 const joulePerKwh = 3.6e6;
 
-export const worthNames = [
-  ['cost', 'Cost'],
-  ['co2', 'Emissions'],
-];
+export const worthNames = Object.entries({ cost: 'Cost', co2: 'Emissions' });
 
 export const useTariff = () => useRead(() => getOnce('/v1/tariff'), 'tariff').value ?? none;
 

@@ -166,19 +166,18 @@ export function Guard({ children }) {
 }
 
 // Ids, or [id, name], as options of a choice; drawn again only when they change, not with every live value.
-export function useOptions(ids) {
-  return useMemo(
+export const Options = ({ of }) =>
+  useMemo(
     () =>
-      ids
-        .map((id) => (Array.isArray(id) ? id : [id, id]))
-        .map(([id, name]) => (
+      of
+        .map((id) => [id].flat())
+        .map(([id, name = id]) => (
           <option key={id} value={id}>
             {name}
           </option>
         )),
-    [ids.join('\n')],
+    [of.join('\n')],
   );
-}
 
 export function useTitleOf(text) {
   document.title = text ? `${text} · joulecast` : 'joulecast';

@@ -142,32 +142,6 @@ function changesFor(job, robot, chosen) {
     .map(([key, value]) => ({ key, from: null, to: format.digits(value, 4) }));
 }
 
-function Messages({ job, state, refusal, refused }) {
-  const { adopted, test, error } = state;
-  return (
-    <>
-      {adopted !== null && (
-        <p class="verdict-box" role="status">
-          Version {adopted} is in force for <a href={robotLink(job.robot_id)}>{job.robot_id}</a>: planning and
-          autonomy use it now, the meter from the next mission on.
-        </p>
-      )}
-      {refusal && (
-        <p class="failure">
-          <b>Not recommended:</b> {refusal}.
-        </p>
-      )}
-      {test && <BackTest test={test} />}
-      {refused && (
-        <p class="failure" role="alert">
-          <b>Not adopted:</b> it does not improve the model on these missions.
-        </p>
-      )}
-      {error && !refused && <Failure error={error} />}
-    </>
-  );
-}
-
 export function Adopt({ job }) {
   const offer = job.result.adoption;
   const groups = offer?.effects.filter((e) => e.instead.length > 0) ?? [];
@@ -176,9 +150,10 @@ export function Adopt({ job }) {
   const effect = groups.map((g) => chosen[g.id] ?? '');
   const robot = useGet(`/v1/robots/${idPath(job.robot_id)}`);
   const [state, askFor] = useAdoption(job.robot_id);
+  const { adopted, test, error } = state;
   const ask = (busy, more) =>
     askFor(busy, { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...more });
-  const refused = state.error?.status === 409 && (state.error.body?.back_test ?? null) !== null;
+  const refused = error?.status === 409 && (error.body.back_test ?? null) !== null;
   const unchosen = effect.includes('');
   const confirm = (label, name, more) => (
     <AdoptButton
@@ -201,8 +176,25 @@ export function Adopt({ job }) {
   );
   return (
     <>
-      <Messages job={job} state={state} refusal={refusal} refused={refused} />
-      {state.adopted === null && (
+      {adopted !== null && (
+        <p class="verdict-box" role="status">
+          Version {adopted} is in force for <a href={robotLink(job.robot_id)}>{job.robot_id}</a>: planning and
+          autonomy use it now, the meter from the next mission on.
+        </p>
+      )}
+      {refusal && (
+        <p class="failure">
+          <b>Not recommended:</b> {refusal}.
+        </p>
+      )}
+      {test && <BackTest test={test} />}
+      {refused && (
+        <p class="failure" role="alert">
+          <b>Not adopted:</b> it does not improve the model on these missions.
+        </p>
+      )}
+      {error && !refused && <Failure error={error} />}
+      {adopted === null && (
         <div class="row wrap tools adopt">
           {groups.map((g) => (
             <ChooseEffect

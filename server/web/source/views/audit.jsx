@@ -144,7 +144,7 @@ const what = ({ action, detail: { path = '' } }) => {
 };
 
 // The request as it came, on demand.
-const Detail = ({ of: { method, path, ...rest } }) => (
+const requestCell = ({ detail: { method, path, ...rest } }) => (
   <details>
     <summary>{[method, path].filter(Boolean).join(' ')}</summary>
     {format.members(rest)}
@@ -157,7 +157,7 @@ const columns = [
   column('address', 'From', (e) => e.address ?? 'the service'),
   column('action', 'What', what, { head: true }),
   figure('status', 'Answer', (e) => e.detail.status ?? '–'),
-  column('detail', 'Request', (e) => <Detail of={e.detail} />, { class: 'words' }),
+  column('detail', 'Request', requestCell, { class: 'words' }),
 ];
 
 // A log, of useNewest(), below its fields, as a List.

@@ -1,7 +1,7 @@
 // Fields by which missions, trends and comparisons choose robots and times.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { useLive } from '../live.js';
-import { Button, useNarrow, useOptions } from '../widgets.jsx';
+import { Button, Options, useNarrow } from '../widgets.jsx';
 
 // "2026-11-21T06:10" or "2026-11-21" in local time, as the inputs of the browser give it, to microseconds.
 const dateOf = (local) => new Date(local.includes('T') ? local : `${local}T00:00`);
@@ -39,7 +39,7 @@ export const Field = ({ label, children }) => (
 export const SelectField = ({ label, value, onChange, options }) => (
   <Field label={label}>
     <select value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value)}>
-      {useOptions(options)}
+      <Options of={options} />
     </select>
   </Field>
 );
@@ -160,7 +160,7 @@ export function Several({ label, one, value, onChange, options, none }) {
         ))}
         <select aria-label={one} value="" onChange={add}>
           <option value="">{chosen.length === 0 ? none : 'and …'}</option>
-          {useOptions(left)}
+          <Options of={left} />
         </select>
       </span>
     </div>

@@ -11,30 +11,20 @@ const lateStoredS = 10; // samples are stored twice a second
 
 const ago = (second) => (format.known(second) ? `${format.span(second)} ago` : 'never');
 
-function Alive({ node }) {
-  return (
-    <span class={node.alive ? '' : 'fault'}>
-      <span class={`lamp ${node.alive ? 'good' : 'bad'}`} aria-hidden="true" />
-      {node.alive ? 'alive' : 'gone'}
-    </span>
-  );
-}
+const aliveCell = ({ alive }) => (
+  <span class={alive ? '' : 'fault'}>
+    <span class={`lamp ${alive ? 'good' : 'bad'}`} aria-hidden="true" />
+    {alive ? 'alive' : 'gone'}
+  </span>
+);
 
 const count = (key, title, value, more) =>
   figure(key, title, (row) => format.fixed(value(row)), { sort: value, ...more });
 
-function NodeName({ node, own }) {
-  if (node !== own) return node;
-  return (
-    <>
-      {node} <span class="flag good">this daemon</span>
-    </>
-  );
-}
-
+const ownFlag = [' ', <span class="flag good">this daemon</span>];
 const nodeColumns = (own) => [
-  column('node', 'Daemon', (n) => <NodeName node={n.node} own={own} />, { head: true }),
-  column('alive', 'State', (n) => <Alive node={n} />),
+  column('node', 'Daemon', ({ node }) => [node, node === own && ownFlag], { head: true }),
+  column('alive', 'State', aliveCell),
   column('address', 'Address', (n) => n.address),
   column('version', 'Version', (n) => n.version),
   figure('joined', 'Joined', (n) => ago(n.joined_s)),
@@ -51,9 +41,9 @@ function lagOf(lease, state) {
   return Math.max(0, (state.utime_us - lease.stored_utime_us) * 1e-6);
 }
 
-function Lag({ second }) {
-  if (second === null) return <span class="note">–</span>;
-  return <span class={second > lateStoredS ? 'fault' : ''}>{format.span(second)}</span>;
+function lagCell({ lag }) {
+  if (lag === null) return <span class="note">–</span>;
+  return <span class={lag > lateStoredS ? 'fault' : ''}>{format.span(lag)}</span>;
 }
 
 const leaseColumns = [
@@ -63,7 +53,7 @@ const leaseColumns = [
   }),
   column('node', 'Kept by', (l) => l.node ?? <span class="fault">none</span>, { sort: (l) => l.node ?? '' }),
   figure('taken', 'Since', (l) => format.span(l.taken_s), { sort: (l) => l.taken_s }),
-  figure('lag', 'Lag', (l) => <Lag second={l.lag} />, {
+  figure('lag', 'Lag', lagCell, {
     sort: (l) => l.lag,
     hint: 'from the newest sample of an open mission back to the last stored one',
   }),

@@ -79,23 +79,6 @@ function ConditionChart({ map, after }) {
   );
 }
 
-function Conditions({ maps, after }) {
-  if (maps.length === 0) return null;
-  return (
-    <Panel title="Error of the modelled power by operating condition">
-      <div class="charts">
-        {maps.map((map) => (
-          <ConditionChart key={map.axis} map={map} after={after} />
-        ))}
-      </div>
-      <Colours after={after} />
-      <p class="note foot">
-        Above zero the robot consumes more than its model. Lines: 95 % intervals of the robot file.
-      </p>
-    </Panel>
-  );
-}
-
 // A place that an effect names, as a zone of the map.
 function zonesOf(effects) {
   return effects
@@ -176,26 +159,11 @@ const missionColumns = [
   column('start', 'Started', (m) => format.time(m.start_utime_us), { class: 'when' }),
   figure('length', 'Duration', (m) => format.span(m.length_s)),
   figure('payload', 'Payload, kg', (m) => format.digits(m.payload_kg)),
-  ...[
-    ['energy_before', 'Gap in energy'],
-    ['energy_after', 'With the effects'],
-    ['power_before', 'Gap in power'],
-    ['power_after', 'With the effects'],
-  ].map(([key, title]) => figure(key, title, (m) => share(m[key]))),
+  figure('energy_before', 'Gap in energy', (m) => share(m.energy_before)),
+  figure('energy_after', 'With the effects', (m) => share(m.energy_after)),
+  figure('power_before', 'Gap in power', (m) => share(m.power_before)),
+  figure('power_after', 'With the effects', (m) => share(m.power_after)),
 ];
-
-function MissionFigures({ missions: all, total, after }) {
-  const missions = rowsOf(all);
-  const columns = missionColumns.filter((c) => after || !c.key.endsWith('_after'));
-  return (
-    <TablePanel
-      title="Missions"
-      columns={columns}
-      rows={missions}
-      note={total > missions.length && `The first ${missions.length} of ${total} missions.`}
-    />
-  );
-}
 
 const perMetre = (value) => format.signed(format.digits(value));
 
@@ -257,17 +225,6 @@ const runColumns = [
   figure('model', 'Error of the model', off('model_j')),
   figure('held', 'With the effects, run held out', off('held_out_j')),
 ];
-
-function Runs({ of: r }) {
-  return (
-    <TablePanel
-      title="Runs"
-      columns={runColumns}
-      rows={r.runs}
-      note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
-    />
-  );
-}
 
 const channels = {
   battery_power: 'battery power',
@@ -392,14 +349,6 @@ const correctionColumns = [
   figure('fits', 'Fits', (c) => format.withDeviation(c.fits, c.sd)),
 ];
 
-function Checks({ checks }) {
-  return (
-    <Panel title="Checks of the recordings">
-      <Texts of={checks.map((c) => (c.contradicted ? `${c.says} It is not used below.` : c.says))} />
-    </Panel>
-  );
-}
-
 const barOf = (name, value, note) => ({ name, value, of: format.percent(value, 1), channel: 'plain', note });
 // "v^2" as "v²".
 const powers = (text) => text.replaceAll('^2', '²').replaceAll('^3', '³');
@@ -499,12 +448,30 @@ const floorOf = (r) =>
 
 function Charts({ result: r }) {
   const f = r.figures;
+  const missions = rowsOf(f.missions);
   const after = r.effects.length > 0;
   return (
     <>
-      <Conditions maps={f.maps} after={after} />
+      {f.maps.length > 0 && (
+        <Panel title="Error of the modelled power by operating condition">
+          <div class="charts">
+            {f.maps.map((map) => (
+              <ConditionChart key={map.axis} map={map} after={after} />
+            ))}
+          </div>
+          <Colours after={after} />
+          <p class="note foot">
+            Above zero the robot consumes more than its model. Lines: 95 % intervals of the robot file.
+          </p>
+        </Panel>
+      )}
       {f.power.t_s.length > 4 && <PowerFigure power={f.power} after={after} />}
-      <MissionFigures missions={f.missions} total={r.missions} after={after} />
+      <TablePanel
+        title="Missions"
+        columns={missionColumns.filter((c) => after || !c.key.endsWith('_after'))}
+        rows={missions}
+        note={r.missions > missions.length && `The first ${missions.length} of ${r.missions} missions.`}
+      />
     </>
   );
 }
@@ -542,7 +509,11 @@ export function Result({ result: r, children }) {
   const placed = r.effects.some((e) => e.parameters.x_m); // its map comes first
   return (
     <>
-      {r.checks?.length > 0 && <Checks checks={r.checks} />}
+      {r.checks?.length > 0 && (
+        <Panel title="Checks of the recordings">
+          <Texts of={r.checks.map((c) => (c.contradicted ? `${c.says} It is not used below.` : c.says))} />
+        </Panel>
+      )}
       <Verdict result={r} />
       <Figures result={r} />
       {r.effects.length > 0 && (
@@ -572,7 +543,14 @@ export function Result({ result: r, children }) {
         </div>
       )}
       {r.groups && <Comparison of={r} />}
-      {r.runs && <Runs of={r} />}
+      {r.runs && (
+        <TablePanel
+          title="Runs"
+          columns={runColumns}
+          rows={r.runs}
+          note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
+        />
+      )}
       {r.figures && <Charts result={r} />}
       {!placed && floorOf(r)}
       {r.channels && <Readings channels={r.channels} />}

@@ -204,25 +204,20 @@ function totalsOf(robots) {
   return t;
 }
 
-// Energy of today and, until the same time of day, of the same weekday a week ago.
+// Totals of missions that began today and, until the same time of day, on the same weekday a week ago.
 async function readToday(signal) {
   const midnight = new Date().setHours(0, 0, 0, 0);
   const sums = (agoMs) => {
     const times = { from_utime_us: (midnight - agoMs) * 1000, to_utime_us: (Date.now() - agoMs) * 1000 };
     return get(`/v1/mission-totals${query(times)}`, signal);
   };
-  const [today, before] = await Promise.all([sums(0), sums(weekMs)]);
-  return new Map(Object.entries({ today, before }));
+  return Promise.all([sums(0), sums(weekMs)]);
 }
-
-// Map with `today` and `before`, totals of missions that began then; empty until they are read.
-const useToday = () => useRenewed(readToday, todayMs, 'today');
 
 // Today's energy, its consumption, and its change against the same weekday a week ago, as a row of Readouts.
 function useTodayRow() {
-  const totals = useToday();
+  const [today, before] = useRenewed(readToday, todayMs, 'today', []);
   const tariff = useTariff();
-  const [today, before] = [totals.get('today'), totals.get('before')];
   if (!today) return ['Today', energy(null)];
   const [now, then] = [today.energy.battery_j ?? 0, before.energy.battery_j];
   const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
@@ -290,16 +285,6 @@ function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
   );
 }
 
-function QuietFold({ count, whole, onToggle }) {
-  return (
-    <p class="fold">
-      <Button class="plain" aria-expanded={String(whole)} onClick={onToggle}>
-        {whole ? 'Hide' : 'Show'} {format.count(count, 'robot')} without telemetry
-      </Button>
-    </p>
-  );
-}
-
 export function Fleet({ given: asked }) {
   const live = useLive();
   const attention = health.useAttention();
@@ -363,7 +348,13 @@ export function Fleet({ given: asked }) {
         ratios={ratios}
       />
       {rows.length === 0 && <Empty title="No robot matches" />}
-      {foldable && <QuietFold count={quiet} whole={whole} onToggle={() => setWhole(!whole)} />}
+      {foldable && (
+        <p class="fold">
+          <Button class="plain" aria-expanded={String(whole)} onClick={() => setWhole(!whole)}>
+            {whole ? 'Hide' : 'Show'} {format.count(quiet, 'robot')} without telemetry
+          </Button>
+        </p>
+      )}
     </>
   );
 }

@@ -49,10 +49,7 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
   const aspect = (b.y_max_m - b.y_min_m) / (b.x_max_m - b.x_min_m);
   const wide = narrow ? Math.min(720, innerWidth - 30) : 740; // about
   const height = Math.round(Math.min(600, 1.3 * wide, Math.max(240, wide * aspect)));
-  const scale = scaleFor(
-    kind,
-    map.cells.map(value).filter((v) => v !== null),
-  );
+  const scale = scaleFor(kind, map.cells.map(value));
   const corners = [
     [b.x_min_m, b.y_min_m],
     [b.x_max_m, b.y_max_m],

@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
 import { useRatios } from '../models.js';
 import { robotLink } from '../route.js';
-import { Answer, Button, Empty, Failure, Heading, List, Panel, useOptions, useTitleOf } from '../widgets.jsx';
+import { Answer, Button, Empty, Failure, Heading, List, Options, Panel, useTitleOf } from '../widgets.jsx';
 import { Adopt } from './adopt.jsx';
 import { Field } from './choosing.jsx';
 import { Result } from './diagnosis.jsx';
@@ -58,10 +58,12 @@ function Progress({ job, onEnd }) {
   );
 }
 
-const Group = ({ name, ids }) => {
-  const options = useOptions(ids);
-  return ids.length > 0 && <optgroup label={name}>{options}</optgroup>;
-};
+const Group = ({ name, ids }) =>
+  ids.length > 0 && (
+    <optgroup label={name}>
+      <Options of={ids} />
+    </optgroup>
+  );
 
 function Start({ given, onStart }) {
   const live = useLive();

@@ -29,12 +29,7 @@ function cornerOf(level, x, y) {
 
 function cornersOf(level, image) {
   const [wide, tall] = [image.naturalWidth * level.resolution_m, image.naturalHeight * level.resolution_m];
-  return [
-    [0, 0],
-    [wide, 0],
-    [0, tall],
-    [wide, tall],
-  ].map(([x, y]) => cornerOf(level, x, y));
+  return [0, wide].flatMap((x) => [0, tall].map((y) => cornerOf(level, x, y)));
 }
 
 function drawPlan(c, view, level, image) {

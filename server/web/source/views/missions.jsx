@@ -115,6 +115,7 @@ function filterOf(given) {
   };
 }
 
+const records = { '': 'all', false: 'complete', true: 'incomplete' };
 const views = ['sort', 'down']; // how missions are shown, not which
 
 // The filters in the address.
@@ -155,11 +156,7 @@ function Chosen({ given, change }) {
       <BoundFields label="Payload, kg" name="payload" given={given} change={change} min="0" />
       <BoundFields label="Ratio" name="ratio" given={given} change={change} />
       {field.select('State', 'state', [['', 'all'], ...Object.keys(missionStates)])}
-      {field.select('Record', 'incomplete', [
-        ['', 'all'],
-        ['false', 'complete'],
-        ['true', 'incomplete'],
-      ])}
+      {field.select('Record', 'incomplete', Object.entries(records))}
       {field.text('Name contains', 'name', { type: 'search' })}
       <Button
         class="plain"

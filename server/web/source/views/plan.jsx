@@ -190,11 +190,7 @@ function ResultArea({ plan, given, change }) {
       )}
       {given.way === 'legs' && plan.answer === null && path.length > 1 && (
         <Panel class="screen" title="Path">
-          <FloorPath
-            points={path.map(([x, y]) => [x, y, NaN])}
-            legend={false}
-            label="The path that was entered"
-          />
+          <FloorPath points={path.map(([x, y]) => [x, y, NaN])} label="The path that was entered" />
         </Panel>
       )}
     </div>

@@ -4,7 +4,7 @@ import { legKinds, newLeg } from '../drive_path.js';
 import { FloorView, drawDot, drawRobot, placeIn, strokeThrough, viewOf } from '../floor.jsx';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
-import { Button, Choice } from '../widgets.jsx';
+import { Button, Choice, Options } from '../widgets.jsx';
 import { Field, NumberInput, fieldsOf } from './choosing.jsx';
 
 const snapM = 0.25;
@@ -163,11 +163,7 @@ function Legs({ legs, change, fault }) {
               value={leg.kind}
               onChange={(e) => replace(k, newLeg(e.currentTarget.value))}
             >
-              {Object.entries(legKinds).map(([kind, { name }]) => (
-                <option key={kind} value={kind}>
-                  {name}
-                </option>
-              ))}
+              <Options of={Object.entries(legKinds).map(([kind, { name }]) => [kind, name])} />
             </select>
             <span class="leg-fields">
               <LegFields leg={leg} number={k + 1} set={(part) => replace(k, { ...leg, ...part })} />

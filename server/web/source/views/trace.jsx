@@ -49,13 +49,11 @@ function Sides({ telemetry, mission, quantity }) {
   );
 }
 
-function Motors({ mission, zoom }) {
+function Motors({ mission, zoom, window }) {
   const [shown, setShown] = useState(false);
   const [quantity, setQuantity] = useState('voltage');
   const [from, to] = zoom ?? [0, mission.energy.duration_s];
   const short = to - from <= mostS;
-  const utime = (second) => Math.round(mission.start_utime_us + second * 1e6);
-  const window = zoom ? { from_utime_us: utime(from), to_utime_us: utime(to) } : {};
   const path = `/v1/missions/${mission.id}/telemetry${query({ ...window, limit: mostSamples })}`;
   const telemetry = useGet(shown && short ? path : null);
   const options = Object.fromEntries(Object.entries(quantities).map(([key, [name]]) => [key, name]));
@@ -91,10 +89,11 @@ function Motors({ mission, zoom }) {
 }
 
 const tracePoints = 700;
-// Columns for the chart, with an empty row where the trace pauses, so that no line bridges it.
-function withPauses({ start_utime_us: starts, width_us: width }, startUs, columns) {
+// Columns of bands for the chart, with an empty row where the trace pauses, so that no line bridges it.
+function withPauses({ start_utime_us: starts, width_us: width }, startUs, ...bands) {
   const times = withGaps(starts, 1.9 * width);
   const rows = new Map(starts.map((t, k) => [t, k]));
+  const columns = bands.flatMap((band) => [band.max, band.min, band.mean]);
   return [
     times.map((t) => (t - startUs + width / 2) / 1e6),
     ...columns.map((column) => times.map((t) => column[rows.get(t)] ?? null)),
@@ -103,23 +102,21 @@ function withPauses({ start_utime_us: starts, width_us: width }, startUs, column
 
 function Charts({ trace, mission, setZoom, setCursor }) {
   const [power, speed] = useMemo(() => {
-    const bands = (...of) =>
-      withPauses(
-        trace,
-        mission.start_utime_us,
-        of.flatMap((band) => [band.max, band.min, band.mean]),
-      );
-    return [bands(trace.measured_power_w, trace.modelled_power_w), bands(trace.speed_m_s)];
+    const of = (...bands) => withPauses(trace, mission.start_utime_us, ...bands);
+    return [of(trace.measured_power_w, trace.modelled_power_w), of(trace.speed_m_s)];
   }, [trace]);
   const traceNow = useRef(trace);
   traceNow.current = trace;
+  const plots = useRef(new Set());
   const hooks = {
+    init: [(u) => plots.current.add(u)],
+    destroy: [(u) => plots.current.delete(u)],
     setCursor: [
       (u) =>
         setCursor(
-          u.cursor.idx === null || u.cursor.idx === undefined
-            ? null
-            : lastAt(traceNow.current.start_utime_us, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6),
+          format.known(u.cursor.idx)
+            ? lastAt(traceNow.current.start_utime_us, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6)
+            : null,
         ),
     ],
     setSelect: [
@@ -152,17 +149,15 @@ function Charts({ trace, mission, setZoom, setCursor }) {
       series: [{}, ...shown.flatMap(([colour, width]) => [none, none, line(colour, width)])],
     };
   };
-  const powers = (p) => [
+  const makePower = maker('', 'power, W', (p) => [
     [p.measured, 2.75, 0.2],
     [p.modelled, 1, 0.16],
-  ];
-  const makePower = maker('', 'power, W', powers);
+  ]);
   const makeSpeed = maker('time since the start', 'speed, m/s', (p) => [[p.ink, 1.5, 0.12]]);
   // Keys move the cursor over both charts and zoom around it.
-  const plots = useRef([]);
   const at = useRef(0);
   const key = (event) => {
-    const t = plots.current[0].data[0];
+    const [t] = power;
     const far = Math.max(1, Math.round(t.length / 20));
     const step = event.shiftKey ? far : 1;
     const to = { ArrowLeft: at.current - step, ArrowRight: at.current + step, Home: 0, End: t.length - 1 }[
@@ -192,7 +187,6 @@ function Charts({ trace, mission, setZoom, setCursor }) {
         data={power}
         height={270}
         changes={[mission.id]}
-        onReady={(u) => void (plots.current[0] = u)}
         label="Battery power over the mission, measured and modelled, with the least and greatest of each span"
       />
       <Chart
@@ -200,7 +194,6 @@ function Charts({ trace, mission, setZoom, setCursor }) {
         data={speed}
         height={150}
         changes={[mission.id]}
-        onReady={(u) => void (plots.current[1] = u)}
         label="Speed over the mission"
       />
     </div>
@@ -266,21 +259,6 @@ function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
   );
 }
 
-function ChartsAside({ zoomed, onWhole }) {
-  return (
-    <>
-      <span class="row note key">
-        <Key of={{ measured: 'measured', modelled: 'modelled', band: 'minimum to maximum' }} />
-      </span>
-      {zoomed ? (
-        <Button onClick={onWhole}>Whole mission</Button>
-      ) : (
-        <span class="note">drag or press + to zoom</span>
-      )}
-    </>
-  );
-}
-
 export function TracePanels({ mission, whole, fine, given: asked }) {
   const [given, change] = useChoices(asked);
   const [cursor, setCursor] = useState(null);
@@ -306,7 +284,16 @@ export function TracePanels({ mission, whole, fine, given: asked }) {
         <Panel
           class="screen"
           title="Power and speed"
-          aside={<ChartsAside zoomed={zoom !== null} onWhole={() => setZoom(null)} />}
+          aside={[
+            <span class="row note key">
+              <Key of={{ measured: 'measured', modelled: 'modelled', band: 'minimum to maximum' }} />
+            </span>,
+            zoom !== null ? (
+              <Button onClick={() => setZoom(null)}>Whole mission</Button>
+            ) : (
+              <span class="note">drag or press + to zoom</span>
+            ),
+          ]}
         >
           <Charts trace={trace} mission={mission} setZoom={setZoom} setCursor={setCursor} />
           <AtCursor trace={trace} mission={mission} index={cursor} />
@@ -324,7 +311,7 @@ export function TracePanels({ mission, whole, fine, given: asked }) {
           setColouring={(to) => change({ colour: to === 'gap' ? to : '' })}
         />
       </div>
-      <Motors mission={mission} zoom={zoom} />
+      <Motors mission={mission} zoom={zoom} window={window} />
     </>
   );
 }
