@@ -29,14 +29,12 @@ async function load() {
   }
 }
 
-function Later({ part, ...props }) {
-  const loading = useRead(load, loaded ? null : 'views');
-  if (loaded === null) return <Answer of={loading} what="this part of the page" />;
-  const View = loaded[part];
-  return <View {...props} />;
-}
-
-const later = (part) => (props) => <Later part={part} {...props} />;
+const later = (part) =>
+  function Later(props) {
+    const loading = useRead(load, loaded ? null : 'views');
+    const View = loaded?.[part];
+    return View ? <View {...props} /> : <Answer of={loading} what="this part of the page" />;
+  };
 
 // The views with the names of their tabs, or the tab that they belong to.
 const views = new Map(

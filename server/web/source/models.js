@@ -7,17 +7,12 @@ const none = new Map();
 
 export const forgetModel = (id) => forget(pathOf(id));
 
-const readModels = (ids) =>
-  Promise.all(
-    ids.map((id) =>
-      getOnce(pathOf(id)).then(
-        ({ model }) => [id, model],
-        () => null,
-      ),
-    ),
-  ).then((models) => new Map(models.filter(Boolean)));
+async function readModels(ids) {
+  const answers = await Promise.allSettled(ids.map((id) => getOnce(pathOf(id))));
+  return new Map(answers.map(({ value }, k) => [ids[k], value?.model]));
+}
 
-// Map from robot to its model; a robot is absent until its model is read, and without a model.
+// Map from robot to its model; undefined until its model is read, and without a model.
 export function useModels(ids) {
   const live = useLive();
   const wanted = [...new Set(ids)].filter((id) => live.robots.get(id)?.state.has_model).sort();

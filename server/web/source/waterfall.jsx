@@ -81,18 +81,6 @@ const hatch = (
   </svg>
 );
 
-function Closing({ sum, end, scale, closure, absent }) {
-  const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
-  return (
-    <p class="closing foot">
-      Sum of the terms <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
-      {closure !== undefined &&
-        (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.share(closure, 3)}.`)}
-      {absent.length > 0 && <span class="note"> Negligible: {absent.join(', ')}.</span>}
-    </p>
-  );
-}
-
 // `terms`: energy of each account in joules; `total`: the battery's.
 export function Waterfall({ terms, total, closure, measured = true }) {
   const { rows, sum, absent } = rowsOf(terms, total);
@@ -102,6 +90,7 @@ export function Waterfall({ terms, total, closure, measured = true }) {
   const span = Math.max(Math.max(...ends) - low, 1e-9);
   const x = (joule) => ((joule - low) / span) * 100;
   const scale = energyScale([total], 4);
+  const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
   const last = {
     key: 'battery',
     name: measured ? 'Battery energy' : 'Total',
@@ -128,7 +117,12 @@ export function Waterfall({ terms, total, closure, measured = true }) {
         head={['Account', 'Bar', 'Energy', 'Share']}
         rows={[...shown, last].map(barOf)}
       />
-      <Closing sum={sum} end={total} scale={scale} closure={closure} absent={absent} />
+      <p class="closing foot">
+        Sum of the terms <b>{text(sum)}</b>, battery energy <b>{text(total)}</b>.
+        {closure !== undefined &&
+          (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.share(closure, 3)}.`)}
+        {absent.length > 0 && <span class="note"> Negligible: {absent.join(', ')}.</span>}
+      </p>
     </>
   );
 }

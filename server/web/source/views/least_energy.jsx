@@ -16,7 +16,8 @@ const idleMargin = 1.05; // a standing robot that draws more than this over its 
 
 // {lengthM, stoodS, first, last, utimeUs}: each run between stops, how long the robot stood still before it,
 // the directions in which it begins and ends (rad, NaN without reported positions), and a time within it.
-function runsOf(trace, idlePowerW) {
+// Null if the mission has none, or too many.
+function runsOf(mission, trace, idlePowerW) {
   const runs = [];
   let run = null;
   let place = null;
@@ -55,20 +56,14 @@ function runsOf(trace, idlePowerW) {
     }
     place = [x, y];
   });
-  return { runs: runs.filter(({ lengthM }) => lengthM >= shortest), stoodAtEndS: stoodS };
+  const long = runs.filter(({ lengthM }) => lengthM >= shortest);
+  const driven = long.length > 0 && long.length <= mostRuns && mission.energy.distance_m >= shortest;
+  return driven ? { runs: long, stoodAtEndS: stoodS } : null;
 }
 
 function turnBetween(before, after) {
   const turn = after - before;
   return Math.atan2(Math.sin(turn), Math.cos(turn));
-}
-
-// The runs of the mission; null if it has none.
-function drivenRuns(mission, trace, idlePowerW) {
-  const found = runsOf(trace, idlePowerW);
-  return found.runs.length === 0 || found.runs.length > mostRuns || mission.energy.distance_m < shortest
-    ? null
-    : found;
 }
 
 // The payload of each run as reported by the robot and used in the accounts; null if not stored or reported.
@@ -168,7 +163,7 @@ export function LeastEnergy({ mission, trace }) {
   const robot = useGet(`/v1/robots/${idPath(mission.robot_id)}`);
   const idlePowerW = robot.value?.model.idle_power_w;
   const driven = useMemo(
-    () => (idlePowerW === undefined ? null : drivenRuns(mission, trace, idlePowerW)),
+    () => (idlePowerW === undefined ? null : runsOf(mission, trace, idlePowerW)),
     [mission.id, mission.state, idlePowerW],
   );
   const key = driven && `${mission.id} ${mission.state} ${idlePowerW}`;

@@ -72,7 +72,7 @@ function Findings({ of: f, mission }) {
   return <Facts rows={rows} />;
 }
 
-// The values of each covariate: of labels the words, of numbers their range.
+// Rows of the values of each covariate: of labels the words, of numbers their range.
 function conditionsOf(covariates) {
   const labels = new Map();
   const numbers = [];
@@ -90,20 +90,8 @@ function conditionsOf(covariates) {
       numbers.push([name, least === most ? digits(least) : range]);
     }
   }
-  return [...[...labels].map(([name, words]) => [name, words.join(', ')]), ...numbers];
-}
-
-function Conditions({ answer }) {
-  return (
-    <>
-      <Facts rows={conditionsOf(answer.covariates).map(([name, values]) => [format.words(name), values])} />
-      {answer.next_cursor !== null && (
-        <p class="note foot">
-          Of the first {answer.covariates.reduce((n, c) => n + c.value.length, 0)} changes.
-        </p>
-      )}
-    </>
-  );
+  const rows = [...[...labels].map(([name, words]) => [name, words.join(', ')]), ...numbers];
+  return rows.map(([name, values]) => [format.words(name), values]);
 }
 
 const tracePoints = 700;
@@ -124,16 +112,6 @@ function Head({ mission: m }) {
       <span class="spring" />
       <Button href={`#/map${query({ mission: m.id, robot: m.robot_id })}`}>Play on the map</Button>
     </Heading>
-  );
-}
-
-function Contradictions({ of: list }) {
-  if (list.length === 0) return null;
-  return (
-    <div class="failure" role="alert">
-      <p>Telemetry of this mission is contradicted; its figures may be wrong.</p>
-      <Texts of={list.map((c) => c.says)} />
-    </div>
   );
 }
 
@@ -208,6 +186,7 @@ export function Mission({ id, given }) {
   const { mission, ledger, conditions, trace, fine } = useMission(id);
   const robotId = mission.value?.robot_id;
   const model = useModels(robotId ? [robotId] : []).get(robotId);
+  const { covariates = [], next_cursor: more } = conditions.value ?? {};
   useTitleOf(mission.value?.mission_id ?? 'Mission');
   const missing = (
     <Empty title={`There is no mission ${id}`}>
@@ -219,7 +198,12 @@ export function Mission({ id, given }) {
       {(m) => (
         <>
           <Head mission={m} />
-          <Contradictions of={m.contradictions} />
+          {m.contradictions.length > 0 && (
+            <div class="failure" role="alert">
+              <p>Telemetry of this mission is contradicted; its figures may be wrong.</p>
+              <Texts of={m.contradictions.map((c) => c.says)} />
+            </div>
+          )}
           <Figures mission={m} model={model} />
           <Answer of={trace} what="the trace">
             {(value) => <TracePanels mission={m} whole={value} fine={fine ?? value} given={given} />}
@@ -246,9 +230,14 @@ export function Mission({ id, given }) {
                   <Findings of={m.findings} mission={m} />
                 </Panel>
               )}
-              {conditions.value?.covariates.length > 0 && (
+              {covariates.length > 0 && (
                 <Panel title="Conditions">
-                  <Conditions answer={conditions.value} />
+                  <Facts rows={conditionsOf(covariates)} />
+                  {more !== null && (
+                    <p class="note foot">
+                      Of the first {covariates.reduce((n, c) => n + c.value.length, 0)} changes.
+                    </p>
+                  )}
                 </Panel>
               )}
             </div>

@@ -193,23 +193,6 @@ function Totals({ of }) {
   );
 }
 
-function Loaded({ list, total }) {
-  const of = total === null ? '' : ` of ${format.fixed(total)}`;
-  return (
-    <nav class="row wrap pages" aria-label="More missions">
-      <span role="status">
-        {format.fixed(list.value.entries.length)}
-        {of} loaded
-      </span>
-      {list.value.next !== null && (
-        <Button disabled={list.loading} onClick={list.more}>
-          {list.loading ? 'Loading …' : 'Load more'}
-        </Button>
-      )}
-    </nav>
-  );
-}
-
 function List({ given, list, total, sort, onSort }) {
   const rows = list.value.entries;
   const title = choosing(given) ? 'No mission matches' : 'No mission yet';
@@ -225,7 +208,19 @@ function List({ given, list, total, sort, onSort }) {
           <MissionTable missions={rows} sort={sort} onSort={onSort} />
         )}
       </div>
-      {rows.length > 0 && <Loaded list={list} total={total} />}
+      {rows.length > 0 && (
+        <nav class="row wrap pages" aria-label="More missions">
+          <span role="status">
+            {format.fixed(rows.length)}
+            {total !== null && ` of ${format.fixed(total)}`} loaded
+          </span>
+          {list.value.next !== null && (
+            <Button disabled={list.loading} onClick={list.more}>
+              {list.loading ? 'Loading …' : 'Load more'}
+            </Button>
+          )}
+        </nav>
+      )}
     </>
   );
 }

@@ -97,17 +97,6 @@ function usePlan() {
   };
 }
 
-function Figures({ answer }) {
-  const rows = [
-    ['Least energy', energy(answer.energy_j), '', 'accent'],
-    ['Duration', format.span(answer.duration_s)],
-    ['Distance', format.length(answer.distance_m)],
-    ['Top speed', format.unit(answer.peak_speed_m_s, 'm/s', 2)],
-    ['Consumption', consumption(answer.distance_m > 0 ? answer.energy_j / answer.distance_m : null)],
-  ];
-  return <Readouts large rows={rows} />;
-}
-
 function Result({ plan, path, take }) {
   const { answer } = plan;
   const driven = useMemo(
@@ -117,7 +106,16 @@ function Result({ plan, path, take }) {
   return (
     <>
       <PlanVerdict answer={answer} autonomy={plan.autonomy} />
-      <Figures answer={answer} />
+      <Readouts
+        large
+        rows={[
+          ['Least energy', energy(answer.energy_j), '', 'accent'],
+          ['Duration', format.span(answer.duration_s)],
+          ['Distance', format.length(answer.distance_m)],
+          ['Top speed', format.unit(answer.peak_speed_m_s, 'm/s', 2)],
+          ['Consumption', consumption(answer.distance_m > 0 ? answer.energy_j / answer.distance_m : null)],
+        ]}
+      />
       <div class="columns">
         <div>
           <Panel class="screen" title="Speed and power">
@@ -151,15 +149,6 @@ function Result({ plan, path, take }) {
   );
 }
 
-function Outdated({ onCompute }) {
-  return (
-    <div class="verdict-box outdated" role="status">
-      <b>Out of date.</b> The path or the terms have changed since this was computed.{' '}
-      <Button onClick={onCompute}>Compute again</Button>
-    </div>
-  );
-}
-
 const floorPath = (given) =>
   given.way === 'legs'
     ? drive.pointsOfLegs(given.legs).filter(([x, y]) => Number.isFinite(x + y))
@@ -182,7 +171,12 @@ function ResultArea({ plan, given, change }) {
         </Panel>
       )}
       {plan.answer === null && plan.error === null && <Loading what="the plan" />}
-      {plan.answer !== null && outdated && !plan.busy && <Outdated onCompute={() => plan.compute(given)} />}
+      {outdated && !plan.busy && (
+        <div class="verdict-box outdated" role="status">
+          <b>Out of date.</b> The path or the terms have changed since this was computed.{' '}
+          <Button onClick={() => plan.compute(given)}>Compute again</Button>
+        </div>
+      )}
       {plan.answer !== null && (
         <div class={plan.busy || outdated ? 'stale' : ''}>
           <Result plan={plan} path={outdated ? path : null} take={take} />

@@ -53,11 +53,8 @@ function groupsOf(document) {
 
 const emptyOf = (groups) => Object.fromEntries(groups.filter(({ key }) => key).map(({ key }) => [key, {}]));
 
-const valueAt = (file, pointer) =>
-  pointer
-    .slice(1)
-    .split('/')
-    .reduce((of, key) => of?.[key], file);
+const keysOf = (pointer) => pointer.slice(1).split('/');
+const valueAt = (file, pointer) => keysOf(pointer).reduce((of, key) => of?.[key], file);
 
 // The file with another value there; without the member for undefined.
 function changed(file, [key, ...rest], value) {
@@ -122,7 +119,7 @@ function FileField({ of, file, fixed, finding, onChange }) {
           of={of}
           value={value}
           fixed={fixed}
-          onChange={(v) => onChange(changed(file, of.pointer.slice(1).split('/'), v))}
+          onChange={(v) => onChange(changed(file, keysOf(of.pointer), v))}
         />
         <span class="unit">{of.unit}</span>
       </span>
@@ -143,6 +140,7 @@ function Review({ of, file }) {
   const missing = of.findings.filter((f) => f.fault && valueAt(file, f.field) === undefined);
   const others = of.findings.filter((f) => !missing.includes(f));
   const hours = format.known(of.standing_h) ? format.about(3600 * of.standing_h) : '–';
+  const nameOf = (key) => unitOf(key)[0];
   return (
     <>
       <Readouts
@@ -158,13 +156,7 @@ function Review({ of, file }) {
           {format.count(missing.length, 'value is', 'values are')} missing:{' '}
           {missing
             .slice(0, 6)
-            .map((f) =>
-              f.field
-                .slice(1)
-                .split('/')
-                .map((key) => unitOf(key)[0])
-                .join(' '),
-            )
+            .map((f) => keysOf(f.field).map(nameOf).join(' '))
             .join(', ')}
           {missing.length > 6 && ' …'}
         </p>
@@ -172,7 +164,7 @@ function Review({ of, file }) {
       <ul class="reasons">
         {others.map((f) => (
           <li key={f.field + f.says} class={f.fault ? 'fault' : ''}>
-            <code>{f.field.slice(1).replaceAll('/', '.')}</code> {f.says}
+            <code>{keysOf(f.field).join('.')}</code> {f.says}
           </li>
         ))}
       </ul>

@@ -105,20 +105,17 @@ function measuresOf(tariff, joules) {
   ];
 }
 
-// {x: seconds of each period that any series has, column(series, value)}. Where periods are missing stands
-// one that no series has, so that no line spans the gap.
-function aligned(series, kind) {
-  const all = new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)));
-  const longest = (kind === 'week' ? 7.5 : 1.5) * dayMs * 1000;
-  const x = withGaps(
-    [...all].sort((a, b) => a - b),
-    longest,
-  );
-  const rows = series.map((s) => new Map(s.groups.map((g) => [g.from_utime_us, g])));
-  return {
-    x: x.map((v) => v / 1e6),
-    column: (k, value) => x.map((at) => (rows[k].has(at) ? value(rows[k].get(at)) : null)),
-  };
+// Seconds of each period that any series has, and a column of the values of each. Where periods are missing
+// stands one that no series has, so that no line spans the gap.
+function aligned(series, kind, value) {
+  const all = [...new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)))];
+  all.sort((a, b) => a - b);
+  const x = withGaps(all, (kind === 'week' ? 7.5 : 1.5) * dayMs * 1000);
+  const columns = series.map(({ groups }) => {
+    const values = new Map(groups.map((g) => [g.from_utime_us, value(g)]));
+    return x.map((at) => values.get(at) ?? null);
+  });
+  return [x.map((v) => v / 1e6), ...columns];
 }
 
 const coloursOf = (p) => [p.measured, p.modelled, p.gap, p.ink, p.muted];
@@ -127,9 +124,8 @@ const coloursOf = (p) => [p.measured, p.modelled, p.gap, p.ink, p.muted];
 function TrendChart({ series, kind, label, value, unit, zero, amount }) {
   const periodMs = (kind === 'week' ? 7 : 1) * dayMs;
   const data = useMemo(() => {
-    const { x, column: columnOf } = aligned(series, kind);
+    const [x, ...columns] = aligned(series, kind, value);
     const ended = (second) => second * 1000 + periodMs <= Date.now();
-    const columns = series.map((_, k) => columnOf(k, value));
     if (!amount) return [x, ...columns];
     const only = (wanted) => columns.map((c) => c.map((v, k) => (ended(x[k]) === wanted ? v : null)));
     return [x, ...only(true), ...only(false)];
