@@ -28,19 +28,12 @@ function Offer({ of: offer }) {
   );
 }
 
-function Origin() {
-  const [right, left] = robot.motor.friction_torque_nm;
-  const lines = [
-    `Read from: ${origin.sources.join(', ')}.`,
-    `Model: ${origin.model}: wheel radius ${format.digits(robot.kinematics.wheel_radius_m)} m, half track ${format.digits(robot.kinematics.half_track_m)} m, friction torque ${format.digits(right)} and ${format.digits(left)} N m (right, left), idle power ${format.digits(robot.idle_power_w)} W.`,
-    `Report made${origin.made_at && ` ${origin.made_at} UTC`} by ${origin.software}.`,
-  ];
-  return (
-    <Panel title="Origin of the data">
-      <Texts of={lines} />
-    </Panel>
-  );
-}
+const [right, left] = robot.motor.friction_torque_nm;
+const originLines = [
+  `Read from: ${origin.sources.join(', ')}.`,
+  `Model: ${origin.model}: wheel radius ${format.digits(robot.kinematics.wheel_radius_m)} m, half track ${format.digits(robot.kinematics.half_track_m)} m, friction torque ${format.digits(right)} and ${format.digits(left)} N m (right, left), idle power ${format.digits(robot.idle_power_w)} W.`,
+  `Report made${origin.made_at && ` ${origin.made_at} UTC`} by ${origin.software}.`,
+];
 
 function Report() {
   useTitleOf(title);
@@ -48,7 +41,9 @@ function Report() {
     <main>
       <Heading title={title} />
       <Result result={result}>{result.adoption?.effects.length > 0 && <Offer of={result.adoption} />}</Result>
-      <Origin />
+      <Panel title="Origin of the data">
+        <Texts of={originLines} />
+      </Panel>
     </main>
   );
 }

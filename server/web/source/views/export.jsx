@@ -19,31 +19,34 @@ function save(parts, name, kind) {
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 
-// Saves the CSV of `path` and its following pages. `progress` is called with the number of lines so far.
-export async function saveText(path, name, progress, signal) {
-  const parts = [];
-  let count = 0;
-  for (let at = path; at !== null;) {
-    const { text, next } = await getText(at, 'text/csv', signal);
-    parts.push(parts.length === 0 ? text : text.slice(text.indexOf('\n') + 1));
-    count += text.split('\r\n').length - 2;
-    progress?.(count);
-    at = next;
-  }
-  save(parts, name, 'csv');
+// A row of Export: the CSV of `path` and its following pages.
+export function csvOf(path, name) {
+  const saveCsv = async (progress, signal) => {
+    const parts = [];
+    let count = 0;
+    for (let at = path; at !== null;) {
+      const { text, next } = await getText(at, 'text/csv', signal);
+      parts.push(parts.length === 0 ? text : text.slice(text.indexOf('\n') + 1));
+      count += text.split('\r\n').length - 2;
+      progress(count);
+      at = next;
+    }
+    save(parts, name, 'csv');
+  };
+  return ['CSV', saveCsv];
 }
 
-async function saveJson(filter, progress, signal) {
-  const { entries } = await newest('/v1/missions', filter, Infinity, signal, progress);
-  save(['[\n', entries.map((m) => JSON.stringify(m)).join(',\n'), '\n]\n'], 'missions', 'json');
+// Rows of Export: missions in both formats.
+export function missionFiles(filter) {
+  const saveJson = async (progress, signal) => {
+    const { entries } = await newest('/v1/missions', filter, Infinity, signal, progress);
+    save(['[\n', entries.map((m) => JSON.stringify(m)).join(',\n'), '\n]\n'], 'missions', 'json');
+  };
+  return [csvOf(`/v1/missions${query({ ...filter, limit: pageRows })}`, 'missions'), ['JSON', saveJson]];
 }
 
-export const exportMissions = (kind, filter, progress, signal) =>
-  kind === 'csv'
-    ? saveText(`/v1/missions${query({ ...filter, limit: pageRows })}`, 'missions', progress, signal)
-    : saveJson(filter, progress, signal);
-
-// Buttons that save data as files, of rows [name, save(progress, signal)]. `total`: lines, if stated.
+// Buttons that save data as files, of rows [name, save(progress, signal)], where `progress` is called with
+// the number of lines so far. `total`: lines, if stated.
 export function Export({ of, total, disabled }) {
   const [count, setCount] = useState(null);
   const [error, setError] = useState(null);

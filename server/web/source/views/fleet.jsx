@@ -149,13 +149,7 @@ function useOrder(live, text, only, sort, attention, ratios) {
     const keep = only === 'heard' ? (s) => !health.unheard(s) : filters[only][1];
     const rows = chosen(live.robots, text, keep, attention)
       .sort((a, b) => names.compare(a.id, b.id))
-      .map((entry) => ({
-        id: entry.id,
-        state: entry.state,
-        needs: attention.get(entry.id),
-        ratio: ratios.get(entry.id),
-        entry,
-      }));
+      .map((entry) => ({ ...entry, entry, needs: attention.get(entry.id), ratio: ratios.get(entry.id) }));
     const ordered = sorted(rows, columns, sort);
     // Robots without telemetry come last in every order.
     const heard = (wanted) => ordered.filter((r) => health.unheard(r.state) !== wanted);

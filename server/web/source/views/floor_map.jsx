@@ -8,7 +8,7 @@ import { useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
 import { Answer, Button, Choice, Empty, Panel, Quantity, Readouts, useNarrow } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, SelectField, fieldsOf, misordered, timesOf } from './choosing.jsx';
-import { Export, saveText } from './export.jsx';
+import { Export, csvOf } from './export.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 
 const usualDays = 28;
@@ -226,10 +226,7 @@ export function Floor({ given: asked }) {
           options={sides.map((side) => [String(side), `${side} m`])}
         />
         <Choice label="Colours show" {...field.of('show', show)} options={names} />
-        <Export
-          of={[['CSV', (...more) => saveText(`/v1/floor-map${query(filter)}`, 'floor', ...more)]]}
-          disabled={none}
-        />
+        <Export of={[csvOf(`/v1/floor-map${query(filter)}`, 'floor')]} disabled={none} />
       </Filters>
       {none ? (
         <Misordered />

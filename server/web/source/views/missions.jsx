@@ -9,7 +9,7 @@ import { Table, column, figure, orderOf } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Button, Empty, Failure, Ratio, Readouts } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, TypedInput, fieldsOf, misordered, timesOf } from './choosing.jsx';
-import { Export, exportMissions } from './export.jsx';
+import { Export, missionFiles } from './export.jsx';
 
 // The states of missions, in the service's words.
 const missionStates = {
@@ -252,14 +252,7 @@ export function Missions({ given: asked }) {
             <Button href={`#/trends${query({ robot: given.robot })}`}>Trends</Button>
             <Button href="#/trends?of=missions">Compare</Button>
             <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>
-            <Export
-              of={['CSV', 'JSON'].map((kind) => [
-                kind,
-                (...more) => exportMissions(kind.toLowerCase(), { ...filter, ...order }, ...more),
-              ])}
-              total={total}
-              disabled={!total}
-            />
+            <Export of={missionFiles({ ...filter, ...order })} total={total} disabled={!total} />
           </div>
           <Answer of={list} what="missions">
             {() => <List given={given} list={list} total={total} sort={sort} onSort={onSort} />}

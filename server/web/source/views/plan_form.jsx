@@ -42,12 +42,9 @@ export function DrawPath({ points, change }) {
     if (held.current === null) return;
     const point = floorAt(placeIn(event));
     const here = points[held.current];
-    if (here && (here[0] !== point[0] || here[1] !== point[1]))
-      change(points.map((old, k) => (k === held.current ? point : old)));
+    if (here && (here[0] !== point[0] || here[1] !== point[1])) change(points.with(held.current, point));
   };
-  const up = () => {
-    held.current = null;
-  };
+  const up = () => void (held.current = null);
   const key = (event) => {
     const step = event.shiftKey ? 4 * snapM : snapM;
     const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[
@@ -114,39 +111,47 @@ export function DrawPath({ points, change }) {
   );
 }
 
-function LegFields({ leg, number, set }) {
-  return Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (
-    <label key={key} class="inline">
-      <span class="hidden">{`Leg ${number}, ${field.label}`}</span>
-      <NumberInput
-        min={field.min}
-        required
-        title={field.label}
-        value={leg[key]}
-        onChange={(value) => set({ [key]: value })}
-      />
-      <span class="unit">{field.unit}</span>
-    </label>
-  ));
-}
-
-function LegTools({ number, count, move, remove }) {
-  const button = (text, label, disabled, onClick) => (
+// One of the legs: `change(leg)`, `move(by)`, `remove()`.
+function Leg({ leg, number, count, faulty, change, move, remove }) {
+  const tool = (text, label, disabled, onClick) => (
     <Button class="plain" disabled={disabled} aria-label={label} onClick={onClick}>
       {text}
     </Button>
   );
   return (
-    <span class="row leg-tools">
-      {button('↑', `Move leg ${number} up`, number === 1, () => move(-1))}
-      {button('↓', `Move leg ${number} down`, number === count, () => move(1))}
-      {button('×', `Remove leg ${number}`, count === 1, remove)}
-    </span>
+    <li class={faulty ? 'row wrap faulty' : 'row wrap'}>
+      <select
+        aria-label={`Kind of leg ${number}`}
+        value={leg.kind}
+        onChange={(e) => change(newLeg(e.currentTarget.value))}
+      >
+        <Options of={Object.entries(legKinds).map(([kind, { name }]) => [kind, name])} />
+      </select>
+      <span class="leg-fields">
+        {Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (
+          <label key={key} class="inline">
+            <span class="hidden">{`Leg ${number}, ${field.label}`}</span>
+            <NumberInput
+              min={field.min}
+              required
+              title={field.label}
+              value={leg[key]}
+              onChange={(value) => change({ ...leg, [key]: value })}
+            />
+            <span class="unit">{field.unit}</span>
+          </label>
+        ))}
+      </span>
+      <span class="row leg-tools">
+        {tool('↑', `Move leg ${number} up`, number === 1, () => move(-1))}
+        {tool('↓', `Move leg ${number} down`, number === count, () => move(1))}
+        {tool('×', `Remove leg ${number}`, count === 1, remove)}
+      </span>
+    </li>
   );
 }
 
 function Legs({ legs, change, fault }) {
-  const replace = (k, leg) => change(legs.map((old, at) => (at === k ? leg : old)));
   const move = (k, by) => {
     const next = [...legs];
     [next[k], next[k + by]] = [next[k + by], next[k]];
@@ -157,24 +162,16 @@ function Legs({ legs, change, fault }) {
       <legend>Legs</legend>
       <ol>
         {legs.map((leg, k) => (
-          <li key={k} class={fault === k ? 'row wrap faulty' : 'row wrap'}>
-            <select
-              aria-label={`Kind of leg ${k + 1}`}
-              value={leg.kind}
-              onChange={(e) => replace(k, newLeg(e.currentTarget.value))}
-            >
-              <Options of={Object.entries(legKinds).map(([kind, { name }]) => [kind, name])} />
-            </select>
-            <span class="leg-fields">
-              <LegFields leg={leg} number={k + 1} set={(part) => replace(k, { ...leg, ...part })} />
-            </span>
-            <LegTools
-              number={k + 1}
-              count={legs.length}
-              move={(by) => move(k, by)}
-              remove={() => change(legs.filter((_, at) => at !== k))}
-            />
-          </li>
+          <Leg
+            key={k}
+            leg={leg}
+            number={k + 1}
+            count={legs.length}
+            faulty={fault === k}
+            change={(next) => change(legs.with(k, next))}
+            move={(by) => move(k, by)}
+            remove={() => change(legs.toSpliced(k, 1))}
+          />
         ))}
       </ol>
       <Button onClick={() => change([...legs, newLeg('straight')])}>Add a leg</Button>

@@ -20,31 +20,6 @@ function atTimes(times, profile, column) {
   });
 }
 
-function speedOptions(c, turns, cursor) {
-  const yaw = axis('yaw rate, °/s', { scale: 'yaw', side: 1, grid: { show: false } });
-  return {
-    cursor,
-    scales: { x: { time: false }, yaw: {} },
-    axes: [axis('', { size: 28 }), axis('speed, m/s'), ...(turns ? [yaw] : [])],
-    series: [
-      {},
-      line(c.accent, 2.25),
-      line(c.muted, 1.25, { dash: [6, 4] }),
-      line(c.muted, 1.25, { dash: [2, 3] }),
-      line(c.modelled, 1.25, { scale: turns ? 'yaw' : 'y' }),
-    ],
-  };
-}
-
-function powerOptions(c, turns, cursor) {
-  const nothing = { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] };
-  return {
-    cursor,
-    axes: [axis('time, s', { size: 28 }), axis('power, W'), ...(turns ? [axis(' ', nothing)] : [])],
-    series: [{}, line(c.accent, 1.75, { fill: withAlpha(c.accent, 0.12) })],
-  };
-}
-
 export function SpeedChart({ answer }) {
   const p = answer.profile;
   const turns = p.yaw_rate_rad_s.some((v) => Math.abs(v) > 1e-6);
@@ -63,18 +38,40 @@ export function SpeedChart({ answer }) {
   );
   const power = useMemo(() => [p.time_s, p.power_w], [answer]);
   const cursor = { sync: { key: 'plan' }, drag: { x: false, y: false } };
+  // Axes with another one on the right for the yaw rate, empty below the power.
+  const axesOf = (time, value, name, more) => {
+    const right = axis(name, { side: 1, grid: { show: false }, ...more });
+    return [axis(time, { size: 28 }), axis(value), ...(turns ? [right] : [])];
+  };
+  const makeSpeed = (c) => ({
+    cursor,
+    scales: { x: { time: false }, yaw: {} },
+    axes: axesOf('', 'speed, m/s', 'yaw rate, °/s', { scale: 'yaw' }),
+    series: [
+      {},
+      line(c.accent, 2.25),
+      line(c.muted, 1.25, { dash: [6, 4] }),
+      line(c.muted, 1.25, { dash: [2, 3] }),
+      line(c.modelled, 1.25, { scale: turns ? 'yaw' : 'y' }),
+    ],
+  });
+  const makePower = (c) => ({
+    cursor,
+    axes: axesOf('time, s', 'power, W', ' ', { scale: 'y', ticks: { show: false }, values: () => [] }),
+    series: [{}, line(c.accent, 1.75, { fill: withAlpha(c.accent, 0.12) })],
+  });
   const peak = format.fixed(answer.peak_speed_m_s, 2);
   return (
     <>
       <Chart
-        make={(c) => speedOptions(c, turns, cursor)}
+        make={makeSpeed}
         data={data}
         height={210}
         changes={[turns]}
         label={`Speed over ${format.span(answer.duration_s)}, maximum ${peak} metres per second`}
       />
       <Chart
-        make={(c) => powerOptions(c, turns, cursor)}
+        make={makePower}
         data={power}
         height={150}
         changes={[turns]}
@@ -105,20 +102,6 @@ function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW }, shor
 // From zero, so that a front that barely saves anything is shown flat.
 const energyRange = (_, low, high) => [Math.min(0, low), 1.08 * Math.max(0, high)];
 
-function frontOptions(c, unit) {
-  const points = { show: true, size: 12, width: 2, stroke: c.accent, fill: c.accent };
-  return {
-    scales: { x: { time: false }, y: { range: energyRange } },
-    cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
-    axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${unit}`, { size: 72 })],
-    series: [
-      {},
-      { stroke: c.modelled, width: 1.5, spanGaps: true, points: { show: true, size: 5, fill: c.modelled } },
-      { stroke: 'transparent', paths: () => null, points },
-    ],
-  };
-}
-
 // One row for each duration, in order; a column of energies for the front and one for the plan.
 function frontData(answer, joule) {
   const kinds = [answer.pareto, [answer]].map(
@@ -138,13 +121,25 @@ export function Front({ answer, take }) {
   if (front.length < 2)
     return <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>;
   const [first, last] = [front[0], front[front.length - 1]];
+  const make = (c) => {
+    const points = { show: true, size: 12, width: 2, stroke: c.accent, fill: c.accent };
+    return {
+      scales: { x: { time: false }, y: { range: energyRange } },
+      cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
+      axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${scale.u}`, { size: 72 })],
+      series: [
+        {},
+        { stroke: c.modelled, width: 1.5, spanGaps: true, points: { show: true, size: 5, fill: c.modelled } },
+        { stroke: 'transparent', paths: () => null, points },
+      ],
+    };
+  };
   return (
     <>
       <Chart
-        make={(c) => frontOptions(c, scale.u)}
+        make={make}
         data={data}
         height={230}
-        changes={[]}
         label={`Energy against duration, from ${format.span(first.duration_s)} to ${format.span(last.duration_s)}`}
       />
       <p class="note foot">

@@ -14,7 +14,7 @@ import { palette } from '../theme.js';
 import { effectOn, termName } from '../waterfall.jsx';
 import { Answer, Choice, Panel, Quantity, Ratio, Readouts } from '../widgets.jsx';
 import { Filters, Misordered, Several, SomeRobots, fieldsOf, misordered, timesOf } from './choosing.jsx';
-import { Export, saveText } from './export.jsx';
+import { Export, csvOf } from './export.jsx';
 
 const defaultDays = { day: 30, week: 182 };
 const lasts = { 1: '24 h', 7: '7 d', 30: '30 d', 182: '26 weeks' };
@@ -402,12 +402,7 @@ export function Trends({ given: asked }) {
           options={{ '': 'Periods and robots', missions: 'Missions' }}
         />
         <Fields given={given} change={set} kind={kind} missions={missions} />
-        {!missions && (
-          <Export
-            of={[['CSV', (...more) => saveText(totalsPath(summed), 'trends', ...more)]]}
-            disabled={none}
-          />
-        )}
+        {!missions && <Export of={[csvOf(totalsPath(summed), 'trends')]} disabled={none} />}
       </Filters>
       {none && <Misordered />}
       {missions && ids.length === 0 && <p class="note">Choose two or more missions.</p>}
