@@ -3,7 +3,7 @@ import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { once, useRead } from './api.js';
 import { energyUnit } from './energy.js';
 import { palette, useTheme } from './theme.js';
-import { fixed, time } from './format.js';
+import { fixed, time, two } from './format.js';
 
 const narrow = '"Liberation Sans Narrow", "Arial Narrow", "Helvetica Neue", Arial, sans-serif';
 
@@ -50,7 +50,6 @@ const runClock = (_, splits) =>
     if (s === null) return '';
     const sign = s < 0 ? '−' : '';
     const t = Math.abs(s);
-    const two = (v) => String(Math.floor(v)).padStart(2, '0');
     const hours = t < 3600 ? '' : `${Math.floor(t / 3600)}:`;
     const minutes = t < 3600 ? Math.floor(t / 60) : two((t % 3600) / 60);
     return `${sign}${hours}${minutes}:${two(t % 60)}`;

@@ -22,12 +22,14 @@ export function fixed(value, places = 0) {
   return (value < 0 && Number(text) !== 0 ? minus : '') + group(text);
 }
 
+// Decimals that show `count` significant digits.
+const placesOf = (value, count = 2) =>
+  Math.max(0, Math.min(6, count - 1 - Math.floor(Math.log10(Math.abs(value)))));
+
 // About `digits` significant digits, whole numbers never rounded away from the point.
 export function digits(value, count = 3) {
   if (!known(value)) return dash;
-  if (value === 0) return '0';
-  const magnitude = Math.floor(Math.log10(Math.abs(value)));
-  return fixed(value, Math.max(0, Math.min(6, count - 1 - magnitude)));
+  return value === 0 ? '0' : fixed(value, placesOf(value, count));
 }
 
 export function signed(text) {
@@ -72,11 +74,9 @@ export const spanBand = (low, high) =>
 // Both ends of a range, with decimals according to its width.
 export function range(low, high) {
   const wide = Math.abs(high - low);
-  const places = wide > 0 ? Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(wide)))) : 3;
+  const places = wide > 0 ? placesOf(wide) : 3;
   return `${fixed(low, places)} to ${fixed(high, places)}`;
 }
-
-const placesOf = (deviation) => Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));
 
 // "0.54 ± 0.04": two significant digits of the deviation, and the same decimals of the value.
 export function withDeviation(value, deviation) {
@@ -103,12 +103,14 @@ export function text(quantity) {
 
 export const share = (value, places = 0) => text(percent(value, places));
 
+// The whole part in two digits.
+export const two = (value) => String(Math.floor(value)).padStart(2, '0');
+
 // A duration: 8.4 s, 3 min 20 s, 5 h 07 min, 12 d.
 export function span(second) {
   if (!known(second)) return dash;
   const s = Math.abs(second);
   const sign = second < 0 ? minus : '';
-  const two = (v) => String(Math.floor(v)).padStart(2, '0');
   if (s < 60) return `${sign}${s < 9.95 ? s.toFixed(1) : s.toFixed(0)}\u00a0s`;
   if (s < 3600) return `${sign}${Math.floor(s / 60)}\u00a0min ${two(s % 60)}\u00a0s`;
   if (s < 172_800) return `${sign}${Math.floor(s / 3600)}\u00a0h ${two((s % 3600) / 60)}\u00a0min`;
@@ -120,9 +122,8 @@ export function about(second) {
   if (known(second) && second < 60) return `${fixed(second)}\u00a0s`;
   if (!known(second) || second >= 172_800) return span(second);
   const minutes = Math.round(second / 60);
-  return minutes < 60
-    ? `${minutes}\u00a0min`
-    : `${Math.floor(minutes / 60)}\u00a0h ${String(minutes % 60).padStart(2, '0')}\u00a0min`;
+  if (minutes < 60) return `${minutes}\u00a0min`;
+  return `${Math.floor(minutes / 60)}\u00a0h ${two(minutes % 60)}\u00a0min`;
 }
 
 const local = new Intl.DateTimeFormat('sv', { dateStyle: 'short', timeStyle: 'medium' });
@@ -142,6 +143,3 @@ export const members = (object) =>
     .join('; ');
 
 export const degrees = (rad) => (rad * 180) / Math.PI;
-
-// The slope that an angle is, in percent.
-export const slopePercent = (rad) => 100 * Math.tan(rad);

@@ -240,7 +240,7 @@ function strength(effect, name, { value, sd, unit }) {
   if (name === 'ratio') return `${value < 0 ? '' : '+'}${scaled(100)} %`;
   if (unit === 'rad' || unit === 'rad/s') {
     const slope = /tilt|grade|slope|climb/.test(`${effect} ${name}`) && Math.abs(value) < 0.5;
-    const percent = slope ? ` (${format.digits(format.slopePercent(value), 2)} % slope)` : '';
+    const percent = slope ? ` (${format.digits(100 * Math.tan(value), 2)} % slope)` : '';
     return `${scaled(format.degrees(1))}${unit === 'rad' ? '°' : '°/s'}${percent}`;
   }
   return `${scaled(1)}${unit === '1' ? '' : ` ${unit}`}`;

@@ -149,13 +149,12 @@ function Result({ plan, path, take }) {
   );
 }
 
-const floorPath = (given) =>
-  given.way === 'legs'
-    ? drive.pointsOfLegs(given.legs).filter(([x, y]) => Number.isFinite(x + y))
-    : given.points;
-
 function ResultArea({ plan, given, change }) {
-  const path = useMemo(() => floorPath(given), [given.way, given.legs, given.points]);
+  const { way, legs, points } = given;
+  const path = useMemo(
+    () => (way === 'legs' ? drive.pointsOfLegs(legs).filter(([x, y]) => Number.isFinite(x + y)) : points),
+    [way, legs, points],
+  );
   const outdated = plan.answer !== null && JSON.stringify(plan.asked) !== JSON.stringify(given);
   const take = ({ duration_s: durationS }) => {
     const next = { ...given, deadline: String(Math.ceil(durationS * 100) / 100) };
@@ -165,9 +164,9 @@ function ResultArea({ plan, given, change }) {
   return (
     <div class="plan-result" aria-live="polite" aria-busy={String(plan.busy)}>
       {plan.error && <Failure error={plan.error} />}
-      {given.way === 'draw' && (
+      {way === 'draw' && (
         <Panel class="screen" title="Draw the path">
-          <DrawPath points={given.points} change={(points) => change({ points })} />
+          <DrawPath points={points} change={(next) => change({ points: next })} />
         </Panel>
       )}
       {plan.answer === null && plan.error === null && <Loading what="the plan" />}
@@ -182,7 +181,7 @@ function ResultArea({ plan, given, change }) {
           <Result plan={plan} path={outdated ? path : null} take={take} />
         </div>
       )}
-      {given.way === 'legs' && plan.answer === null && path.length > 1 && (
+      {way === 'legs' && plan.answer === null && path.length > 1 && (
         <Panel class="screen" title="Path">
           <FloorPath points={path.map(([x, y]) => [x, y, NaN])} label="The path that was entered" />
         </Panel>

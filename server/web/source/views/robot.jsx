@@ -18,16 +18,6 @@ import { Proposals, RobotHistory } from './robot_history.jsx';
 const recentRows = 12;
 const recentEvents = 12;
 
-function Model({ model }) {
-  const parameters = Object.entries(flat(model)).filter(([key]) => key !== 'robot_id');
-  return (
-    <details class="model">
-      <summary>Parameters in force</summary>
-      <Facts rows={parameters.map(([key, value]) => [<code key={key}>{key}</code>, value])} />
-    </details>
-  );
-}
-
 function whyNowhere(state) {
   if (!state.has_model)
     return 'Telemetry of a robot without a model, including its position, is counted but not stored.';
@@ -217,6 +207,7 @@ export function Robot({ id }) {
   const entry = live.robots.get(id);
   const s = entry?.state;
   const heard = s && !health.unheard(s);
+  const { robot_id: _, ...parameters } = flat(detail.value?.model ?? {});
   useEffect(() => {
     if (entry) showRecent([entry]);
   }, [entry, live.loads]);
@@ -251,7 +242,14 @@ export function Robot({ id }) {
         <div>
           {heard && <RecentEvents id={id} />}
           <Panel title="Model">
-            {detail.value ? <Model model={detail.value.model} /> : <p class="note">none</p>}
+            {detail.value ? (
+              <details class="model">
+                <summary>Parameters in force</summary>
+                <Facts rows={Object.entries(parameters).map(([key, value]) => [<code>{key}</code>, value])} />
+              </details>
+            ) : (
+              <p class="note">none</p>
+            )}
           </Panel>
         </div>
       </div>
