@@ -36,7 +36,7 @@ const options = {
     { in: 'source/views/index.js', out: 'views' },
     // Not by an import of index.js, which would put it into app.css, too.
     { in: 'source/views/views.css', out: 'views' },
-    { in: 'source/uplot.js', out: 'uplot' },
+    { in: 'uplot', out: 'uplot' },
   ],
   splitting: true,
   chunkNames: 'base', // one file of the modules that the first load and the views share

@@ -51,16 +51,14 @@ export function Bars({ rows, label, head, class: name = '' }) {
 
 // Energies in one unit, of rows [name, joules, channel, note].
 export function EnergyBars({ label, rows }) {
-  const scale = energyScale(
-    rows.map(([, value]) => value),
-    4,
-  );
+  const values = rows.map(([, value]) => value);
+  const scale = energyScale(values, 4);
   const barOf = ([name, value, channel, note]) => ({
     name,
     value,
-    of: energyIn(scale, value),
     channel,
     note,
+    of: energyIn(scale, value),
   });
   return <Bars label={label} rows={rows.map(barOf)} />;
 }

@@ -120,7 +120,7 @@ export function lastAt(times, at) {
 
 let uPlot = null;
 
-export const loadCharts = () => once('charts', async () => (uPlot = (await import('./uplot.js')).default));
+export const loadCharts = () => once('charts', async () => (uPlot = (await import('uplot')).default));
 
 // Paths of a series drawn as bars of a width along x, each from `start` beside its x; for use in `make`.
 export const bars = (width, start) => {

@@ -156,8 +156,8 @@ function App() {
           {unit}
         </Button>
         <Button class="row theme" onClick={toggleTheme} aria-label={theme} title={theme}>
-          <svg viewBox="0 0 20 20" width="18" height="18" aria-hidden="true">
-            <circle cx="10" cy="10" r="7.5" class="ring" />
+          <svg viewBox="0 0 20 20" width="18" height="18" fill="currentColor" aria-hidden="true">
+            <circle cx="10" cy="10" r="7.5" fill="none" stroke="currentColor" stroke-width="1.5" />
             <path d="M10 2.5a7.5 7.5 0 0 1 0 15z" />
           </svg>
         </Button>

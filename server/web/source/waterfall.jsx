@@ -71,11 +71,11 @@ function Bar({ row, x, end }) {
 }
 
 const hatch = (
-  <svg class="patterns" width="0" height="0" aria-hidden="true" focusable="false">
+  <svg class="hidden" width="0" height="0" aria-hidden="true" focusable="false">
     <defs>
       <pattern id="hatch" width="6" height="6" patternUnits="userSpaceOnUse" patternTransform="rotate(45)">
-        <rect class="hatch-back" width="6" height="6" />
-        <line class="hatch-line" x1="0" x2="0" y1="0" y2="6" />
+        <rect width="6" height="6" fill="color-mix(in srgb, var(--hatch) 40%, transparent)" />
+        <line x1="0" x2="0" y1="0" y2="6" stroke="var(--gap)" stroke-width="2.4" />
       </pattern>
     </defs>
   </svg>

@@ -85,22 +85,8 @@ const ownFacts = [
   ['memberships_lost', 'Absences longer than the lease'],
 ];
 
-function Leases({ leases }) {
-  const [sort, onSort] = orderOf(...useChoices({}), { key: 'robot', down: false });
-  if (leases.length === 0) return <Empty title="No robot has been kept yet" />;
-  return (
-    <Table
-      class="leases"
-      columns={leaseColumns}
-      rows={sorted(leases, leaseColumns, sort)}
-      keyOf={(l) => l.robot_id}
-      sort={sort}
-      onSort={onSort}
-    />
-  );
-}
-
 function Shown({ of, live }) {
+  const [sort, onSort] = orderOf(...useChoices({}), { key: 'robot', down: false });
   const leases = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
   return (
     <>
@@ -116,7 +102,18 @@ function Shown({ of, live }) {
       <TablePanel title="Daemons" class="cluster" columns={nodeColumns(of.node)} rows={of.nodes} />
       <div class="columns">
         <Panel title="Robots">
-          <Leases leases={leases} />
+          {leases.length === 0 ? (
+            <Empty title="No robot has been kept yet" />
+          ) : (
+            <Table
+              class="leases"
+              columns={leaseColumns}
+              rows={sorted(leases, leaseColumns, sort)}
+              keyOf={(l) => l.robot_id}
+              sort={sort}
+              onSort={onSort}
+            />
+          )}
         </Panel>
         <Panel title={`${of.node}, since it started`}>
           <Facts class="counts" rows={ownFacts.map(([key, name]) => [name, format.fixed(of.own[key])])} />

@@ -281,7 +281,8 @@ function WhereBar({ of: w, most }) {
         y="3"
         height="10"
         width={at(Math.max(Math.abs(w.share), most / 200))}
-        class={`account ${w.share < 0 ? 'good' : 'unexplained-plain'}`}
+        class={`account ${w.share < 0 ? 'good' : 'gap'}`}
+        opacity={w.share < 0 ? 1 : 0.75}
       />
       <line x1={at(ends[0])} x2={at(ends[1])} y1="8" y2="8" class="whisker" />
       {format.known(w.time_share) && (
@@ -476,19 +477,12 @@ function Charts({ result: r }) {
   );
 }
 
-function Readings({ channels: all }) {
-  const rows = Object.entries(all).filter(([, c]) => format.known(c.absolute_relative));
-  if (rows.length === 0) return null;
-  return (
-    <Panel title="Error of each kind of reading">
-      <Bars
-        rows={rows.map(([name, c]) =>
-          barOf(channels[name] ?? format.words(name), c.absolute_relative, `noise ${share(c.noise_floor)}`),
-        )}
-      />
-    </Panel>
-  );
-}
+const readingsOf = (r) =>
+  Object.entries(r.channels ?? {})
+    .filter(([, { absolute_relative: error }]) => format.known(error))
+    .map(([name, { absolute_relative: error, noise_floor: noise }]) =>
+      barOf(channels[name] ?? format.words(name), error, `noise ${share(noise)}`),
+    );
 
 const limitsOf = (r) =>
   [
@@ -506,6 +500,7 @@ const limitsOf = (r) =>
 // `children`: the adoption of its effects.
 export function Result({ result: r, children }) {
   const limits = limitsOf(r);
+  const readings = readingsOf(r);
   const placed = r.effects.some((e) => e.parameters.x_m); // its map comes first
   return (
     <>
@@ -553,7 +548,11 @@ export function Result({ result: r, children }) {
       )}
       {r.figures && <Charts result={r} />}
       {!placed && floorOf(r)}
-      {r.channels && <Readings channels={r.channels} />}
+      {readings.length > 0 && (
+        <Panel title="Error of each kind of reading">
+          <Bars rows={readings} />
+        </Panel>
+      )}
       {limits.length > 0 && (
         <Panel title="Limits">
           <Texts of={limits} />

@@ -297,7 +297,7 @@ function Siblings({ siblings, id }) {
             <svg width="100%" height="16" aria-hidden="true">
               <line x1="50%" x2="50%" y1="0" y2="16" class="one" />
               <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" class="whisker" />
-              <circle cx={at(s.ratio)} cy="8" r="4" class={s.stands_out ? 'gap' : 'measured'} />
+              <circle cx={at(s.ratio)} cy="8" r="4" class={`account ${s.stands_out ? 'gap' : 'measured'}`} />
             </svg>
           ),
           of: format.fixed(s.ratio, 3),

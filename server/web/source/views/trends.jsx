@@ -199,37 +199,20 @@ function Charts({ series, kind }) {
   if (series.every((s) => s.groups.length === 0)) return <p class="note">No mission in this period.</p>;
   const scale = energyScale(series.flatMap((s) => s.groups.map(joule)));
   const { u: perUnit } = consumption(1);
-  const shown = [
-    {
-      title: `Energy per ${kind}`,
-      aside: `outlined: ${kind === 'day' ? 'today' : 'this week'} so far`,
-      unit: scale.u,
-      value: (g) => joule(g) / scale.joule,
-      zero: true,
-      amount: true,
-    },
-    {
-      title: 'Consumption',
-      unit: perUnit,
-      value: (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km),
-      zero: true,
-    },
-    {
-      title: 'Measured over modelled',
-      label: 'Measured over modelled energy',
-      unit: 'ratio',
-      value: (g) => g.ratio,
-    },
-  ];
+  const aside = `outlined: ${kind === 'day' ? 'today' : 'this week'} so far`;
+  const perKm = (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km);
+  const chart = (title, unit, value, { label = title, ...more }) => (
+    <Panel key={title} title={title} aside={more.amount && aside}>
+      <TrendChart series={series} kind={kind} label={label} unit={unit} value={value} {...more} />
+    </Panel>
+  );
   return (
     <>
       <Names series={series} />
       <div class="charts">
-        {shown.map(({ title, aside, label, ...chart }) => (
-          <Panel key={title} title={title} aside={aside}>
-            <TrendChart series={series} kind={kind} label={label ?? title} {...chart} />
-          </Panel>
-        ))}
+        {chart(`Energy per ${kind}`, scale.u, (g) => joule(g) / scale.joule, { zero: true, amount: true })}
+        {chart('Consumption', perUnit, perKm, { zero: true })}
+        {chart('Measured over modelled', 'ratio', (g) => g.ratio, { label: 'Measured over modelled energy' })}
       </div>
       <Periods series={series} kind={kind} />
     </>
