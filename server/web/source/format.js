@@ -39,6 +39,8 @@ export function signed(text) {
 
 // Quantities are {n, u}: the number and the unit, prefixed so that the number stays short.
 
+export const withSign = ({ n, u }) => ({ n: signed(n), u });
+
 export function power(watt) {
   if (!known(watt)) return none;
   const size = Math.abs(watt);

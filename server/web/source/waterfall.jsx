@@ -100,12 +100,13 @@ export function Waterfall({ terms, total, closure, measured = true }) {
   };
   const barOf = (row) => {
     const value = row.total ? row.to : row.change;
+    const quantity = energyIn(scale, value);
     return {
       key: row.key,
       class: row.total ? `total ${row.key}` : row.key === 'unexplained' ? 'odd' : '',
       name: row.name,
       bar: <Bar row={row} x={x} end={total} />,
-      of: <Quantity of={energyIn(scale, value)} sign={!row.total} />,
+      of: row.total ? quantity : format.withSign(quantity),
       note: <Quantity of={format.percent(total !== 0 ? value / total : null, 1)} />,
     };
   };

@@ -4,15 +4,12 @@ import * as format from './format.js';
 import { refusalFor } from './session.js';
 
 // A number with its unit; `of` comes from a function of format.js or energy.js.
-export function Quantity({ of, sign }) {
-  const n = sign ? format.signed(of.n) : of.n;
-  return (
-    <span class="quantity">
-      <span class="number">{n}</span>
-      {of.u && <span class="unit">{`\u00a0${of.u}`}</span>}
-    </span>
-  );
-}
+export const Quantity = ({ of }) => (
+  <span class="quantity">
+    <span class="number">{of.n}</span>
+    {of.u && <span class="unit">{`\u00a0${of.u}`}</span>}
+  </span>
+);
 
 // A quantity as such; anything else unchanged.
 export const shown = (of) => (of?.u === undefined ? of : <Quantity of={of} />);

@@ -12,10 +12,7 @@ function save(parts, name, kind) {
   const url = URL.createObjectURL(new Blob(parts, { type }));
   const stamp = new Date().toISOString().slice(0, 19).replaceAll(':', '');
   const download = `joulecast-${name}-${stamp}.${kind}`;
-  const anchor = Object.assign(document.createElement('a'), { href: url, download });
-  document.body.append(anchor);
-  anchor.click();
-  anchor.remove();
+  Object.assign(document.createElement('a'), { href: url, download }).click();
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 

@@ -6,7 +6,7 @@ import { useTariff, worthTexts } from '../tariff.js';
 import * as format from '../format.js';
 import { useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
-import { Answer, Button, Choice, Empty, Panel, Quantity, Readouts, useNarrow } from '../widgets.jsx';
+import { Answer, Button, Choice, Empty, Panel, Readouts, useNarrow } from '../widgets.jsx';
 import { Filters, Misordered, RobotsField, SelectField, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, csvOf } from './export.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
@@ -110,7 +110,7 @@ function Zones({ map, onMark }) {
     figure('departure', 'Departure', (z) => <b>{share(z.departure)}</b>, {
       hint: 'from the models times each mission’s usual ratio',
     }),
-    figure('excess', 'Excess', (z) => <Quantity of={energyIn(scale, z.excess_j)} sign />),
+    figure('excess', 'Excess', (z) => format.withSign(energyIn(scale, z.excess_j))),
     figure('distance', 'Distance', (z) => format.length(z.distance_m)),
     figure('time', 'Time', (z) => format.span(z.covered_s)),
   ];
@@ -138,7 +138,7 @@ function Squares({ map }) {
   const spent = energyScale(shown.map((c) => c.energy_j));
   const columns = [
     column('square', 'Square', (c) => square(c, map.cell_m), { head: true }),
-    figure('excess', 'Excess', (c) => <Quantity of={energyIn(excess, excessOf(c))} sign />),
+    figure('excess', 'Excess', (c) => format.withSign(energyIn(excess, excessOf(c)))),
     figure('departure', 'Departure', (c) => share(c.departure)),
     figure('energy', 'Energy', (c) => energyIn(spent, c.energy_j)),
     figure('missions', 'Missions', (c) => format.fixed(c.missions)),

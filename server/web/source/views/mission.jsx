@@ -119,7 +119,6 @@ function Figures({ mission: m, model }) {
   const e = m.energy;
   const { ratio } = m;
   const share = chargeShare(e.charge_ah, model);
-  const unexplained = energy(e.unexplained_j);
   const modelledOnly = e.measured_j === null;
   const rows = [
     [
@@ -131,7 +130,7 @@ function Figures({ mission: m, model }) {
     ['Modelled', energy(e.modelled_j), '', 'modelled'],
     [
       'Unexplained',
-      { n: format.signed(unexplained.n), u: unexplained.u },
+      format.withSign(energy(e.unexplained_j)),
       ratio === null ? '' : `ratio ${format.fixed(ratio, 3)}`,
       'gap',
     ],

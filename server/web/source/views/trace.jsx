@@ -206,7 +206,6 @@ function AtCursor({ trace, mission, index }) {
   const measured = trace.measured_power_w;
   const modelled = trace.modelled_power_w;
   const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];
-  const { n, u } = format.power(gap);
   const band = at !== null && measured.mean[at] !== null;
   const rows = [
     ['Time', at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)],
@@ -217,7 +216,7 @@ function AtCursor({ trace, mission, index }) {
       'measured',
     ],
     ['Modelled', of(modelled.mean, format.power), '', 'modelled'],
-    ['Gap', { n: format.signed(n), u }, '', 'gap'],
+    ['Gap', format.withSign(format.power(gap)), '', 'gap'],
     ['Speed', of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))],
     ['Charge', of(trace.state_of_charge, (v) => format.percent(v, 2))],
   ];

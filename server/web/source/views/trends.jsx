@@ -12,7 +12,7 @@ import { missionLink, robotLink, useChoices } from '../route.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
 import { effectOn, termName } from '../waterfall.jsx';
-import { Answer, Choice, Panel, Quantity, Ratio, Readouts } from '../widgets.jsx';
+import { Answer, Choice, Panel, Ratio, Readouts } from '../widgets.jsx';
 import { Filters, Misordered, Several, SomeRobots, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { Export, csvOf } from './export.jsx';
 
@@ -200,7 +200,7 @@ function Charts({ series, kind }) {
   const scale = energyScale(series.flatMap((s) => s.groups.map(joule)));
   const { u: perUnit } = consumption(1);
   const aside = `outlined: ${kind === 'day' ? 'today' : 'this week'} so far`;
-  const perKm = (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km);
+  const consumed = (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km);
   const chart = (title, unit, value, { label = title, ...more }) => (
     <Panel key={title} title={title} aside={more.amount && aside}>
       <TrendChart series={series} kind={kind} label={label} unit={unit} value={value} {...more} />
@@ -211,7 +211,7 @@ function Charts({ series, kind }) {
       <Names series={series} />
       <div class="charts">
         {chart(`Energy per ${kind}`, scale.u, (g) => joule(g) / scale.joule, { zero: true, amount: true })}
-        {chart('Consumption', perUnit, perKm, { zero: true })}
+        {chart('Consumption', perUnit, consumed, { zero: true })}
         {chart('Measured over modelled', 'ratio', (g) => g.ratio, { label: 'Measured over modelled energy' })}
       </div>
       <Periods series={series} kind={kind} />
@@ -296,7 +296,7 @@ function Sides({ sides }) {
     column('name', '', (r) => r.name, { head: true }),
     ...sides.map(({ name }, k) => figure(k, name, (r) => r.cell(r.values[k]))),
     sides.length === 2 &&
-      figure('change', 'Change', (r) => !r.count && <Quantity of={changeOf(r)} sign />, {
+      figure('change', 'Change', (r) => !r.count && format.withSign(changeOf(r)), {
         class: 'figure long',
       }),
     column('bars', '', (r) => r.term && <Strips of={r.values.map(stripOf)} tallPx={8} />, {
