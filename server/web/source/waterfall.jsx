@@ -30,18 +30,19 @@ const negligible = 1e-5; // of the whole
 // Recovered energy is reported as positive and subtracted from the sum.
 export const effectOn = (term, value) => (term === 'recovered' && value ? -value : value);
 
-function rowsOf(terms, total) {
+function rowsOf(terms, total, measured) {
   const empty = ([term, value]) => Math.abs(value) <= negligible * Math.abs(total) && term !== 'unexplained';
   const rows = [];
   let at = 0;
   for (const [term, value] of Object.entries(terms)) {
     const change = effectOn(term, value);
-    if (term === 'unexplained')
+    if (measured && term === 'unexplained')
       rows.push({ key: 'modelled', name: 'Modelled', from: 0, to: at, total: true });
-    if (!empty([term, value]))
+    if ((measured || term !== 'unexplained') && !empty([term, value]))
       rows.push({ key: term, name: termName(term), from: at, to: at + change, change });
     at += change;
   }
+  rows.push({ key: 'battery', name: measured ? 'Battery energy' : 'Total', from: 0, to: total, total: true });
   const absent = Object.entries(terms).filter(empty);
   return { rows, sum: at, absent: absent.map(([term]) => termName(term).toLowerCase()) };
 }
@@ -83,21 +84,13 @@ const hatch = (
 
 // `terms`: energy of each account in joules; `total`: the battery's.
 export function Waterfall({ terms, total, closure, measured = true }) {
-  const { rows, sum, absent } = rowsOf(terms, total);
-  const shown = measured ? rows : rows.filter((row) => row.key !== 'unexplained' && row.key !== 'modelled');
-  const ends = shown.flatMap((row) => [row.from, row.to]).concat(total, 0);
+  const { rows, sum, absent } = rowsOf(terms, total, measured);
+  const ends = rows.flatMap((row) => [row.from, row.to]);
   const low = Math.min(...ends);
   const span = Math.max(Math.max(...ends) - low, 1e-9);
   const x = (joule) => ((joule - low) / span) * 100;
   const scale = energyScale([total], 4);
   const text = (value) => format.text(energyIn({ ...scale, places: scale.places + 1 }, value));
-  const last = {
-    key: 'battery',
-    name: measured ? 'Battery energy' : 'Total',
-    from: 0,
-    to: total,
-    total: true,
-  };
   const barOf = (row) => {
     const value = row.total ? row.to : row.change;
     const quantity = energyIn(scale, value);
@@ -113,11 +106,7 @@ export function Waterfall({ terms, total, closure, measured = true }) {
   return (
     <>
       {hatch}
-      <Bars
-        class="waterfall"
-        head={['Account', 'Bar', 'Energy', 'Share']}
-        rows={[...shown, last].map(barOf)}
-      />
+      <Bars class="waterfall" head={['Account', 'Bar', 'Energy', 'Share']} rows={rows.map(barOf)} />
       <p class="closing foot">
         Sum of the terms <b>{text(sum)}</b>, battery energy <b>{text(total)}</b>.
         {closure !== undefined &&

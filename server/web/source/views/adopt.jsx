@@ -123,11 +123,10 @@ export const AdoptButton = ({ state: { busy }, action = 'Adopt', disabled, ...mo
   />
 );
 
-// One of several effects that the data do not distinguish.
-function ChooseEffect({ of, value, onChange }) {
-  const ids = [of.id, ...of.instead.filter((e) => Object.keys(e.parameters).length > 0).map((e) => e.id)];
-  const options = [['', 'choose one'], ...ids.map((id) => [id, effectName(id)])];
-  return <SelectField label="Adopt which of these" value={value} onChange={onChange} options={options} />;
+// The choice of one of several effects that the data do not distinguish.
+function optionsOf({ id: first, instead }) {
+  const ids = instead.filter((e) => Object.keys(e.parameters).length > 0).map((e) => e.id);
+  return [['', 'choose one'], ...[first, ...ids].map((id) => [id, effectName(id)])];
 }
 
 // The changes of the adoption: those of the diagnosed model, or the parameters of the chosen effects.
@@ -197,11 +196,12 @@ export function Adopt({ job }) {
       {adopted === null && (
         <div class="row wrap tools adopt">
           {groups.map((g) => (
-            <ChooseEffect
+            <SelectField
               key={g.id}
-              of={g}
-              value={chosen[g.id] ?? ''}
+              label="Adopt which of these"
+              value={chosen[g.id]}
               onChange={(id) => setChosen({ ...chosen, [g.id]: id })}
+              options={optionsOf(g)}
             />
           ))}
           <TestButton state={state} ask={ask} disabled={unchosen} />

@@ -189,29 +189,6 @@ const terms = [
   ['charge', 'Charge now', '%', 'live'],
 ];
 
-function Terms({ given, change }) {
-  return (
-    <div class="terms">
-      {terms.map(([key, label, unit, placeholder]) => (
-        <Field key={key} label={label}>
-          <span class="row with-unit">
-            <input
-              type="number"
-              step="any"
-              min="0"
-              max={unit === '%' ? 100 : undefined}
-              placeholder={placeholder}
-              value={given[key]}
-              onInput={(e) => change({ [key]: e.currentTarget.value })}
-            />
-            <span class="unit">{unit}</span>
-          </span>
-        </Field>
-      ))}
-    </div>
-  );
-}
-
 // `given`: {robot, way, legs, points, payload, deadline, value, charge}.
 export function PlanForm({ given, robots, change, busy, fault, onCompute }) {
   const field = fieldsOf(given, change);
@@ -234,7 +211,24 @@ export function PlanForm({ given, robots, change, busy, fault, onCompute }) {
           {given.points.length} points, {format.text(format.length(length(given.points)))}. Draw on the floor.
         </p>
       )}
-      <Terms given={given} change={change} />
+      <div class="terms">
+        {terms.map(([key, label, unit, placeholder]) => (
+          <Field key={key} label={label}>
+            <span class="row with-unit">
+              <input
+                type="number"
+                step="any"
+                min="0"
+                max={unit === '%' ? 100 : undefined}
+                placeholder={placeholder}
+                value={given[key]}
+                onInput={(e) => change({ [key]: e.currentTarget.value })}
+              />
+              <span class="unit">{unit}</span>
+            </span>
+          </Field>
+        ))}
+      </div>
       <button type="submit" class="primary" disabled={given.robot === ''}>
         {busy ? 'Computing …' : 'Compute'}
       </button>

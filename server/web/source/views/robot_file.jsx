@@ -262,33 +262,6 @@ function Remove({ id, onError }) {
   );
 }
 
-function Save({ name, stored, changes, doubts, refusal, onConfirm }) {
-  return (
-    <ConfirmButton
-      class="primary"
-      label={stored ? 'Save' : 'Add this robot'}
-      title={stored ? `Change the model of ${name}?` : `Add ${name}?`}
-      refusal={refusal}
-      onConfirm={onConfirm}
-    >
-      {stored ? (
-        <>
-          <p>
-            A new version replaces version {stored.model_version}. Planning uses it at once, the meter from
-            the next mission on.
-          </p>
-          <Changes of={changes} />
-        </>
-      ) : (
-        <p>Its energy is modelled from its next mission on.</p>
-      )}
-      {doubts > 0 && (
-        <p class="fault">{format.count(doubts, 'value is', 'values are')} implausible; see the review.</p>
-      )}
-    </ConfirmButton>
-  );
-}
-
 // `stored`: the robot's detail; undefined for a new one.
 function Form({ groups, id, stored, begun }) {
   const [file, setFile] = useState(stored?.model ?? { ...emptyOf(groups), ...begun });
@@ -302,6 +275,7 @@ function Form({ groups, id, stored, begun }) {
   const name = file.robot_id ?? '';
   const known = useLive().robots.get(name)?.state.has_model;
   const changes = changesOf(file, stored?.model);
+  const doubts = review?.findings.length ?? 0;
   const faulty = review === null || review.findings.some((f) => f.fault);
   const barred =
     refusalFor('admin') ??
@@ -342,14 +316,30 @@ function Form({ groups, id, stored, begun }) {
           <Panel title="Review">
             {review && <Review of={review} file={file} />}
             <p class="row wrap tools">
-              <Save
-                name={name}
-                stored={stored}
-                changes={changes}
-                doubts={review?.findings.length ?? 0}
+              <ConfirmButton
+                class="primary"
+                label={stored ? 'Save' : 'Add this robot'}
+                title={stored ? `Change the model of ${name}?` : `Add ${name}?`}
                 refusal={barred}
                 onConfirm={save}
-              />
+              >
+                {stored ? (
+                  <>
+                    <p>
+                      A new version replaces version {stored.model_version}. Planning uses it at once, the
+                      meter from the next mission on.
+                    </p>
+                    <Changes of={changes} />
+                  </>
+                ) : (
+                  <p>Its energy is modelled from its next mission on.</p>
+                )}
+                {doubts > 0 && (
+                  <p class="fault">
+                    {format.count(doubts, 'value is', 'values are')} implausible; see the review.
+                  </p>
+                )}
+              </ConfirmButton>
               {stored && <Remove id={id} onError={setError} />}
             </p>
             {barred && <p class="note">{barred}</p>}

@@ -221,24 +221,18 @@ function Charts({ series, kind }) {
 
 // Energy charged in a period, summed over the stays at chargers in the log: {stays, joule, whole}; not whole:
 // there are more stays, which were not read.
-async function readCharged([from, to], robots, signal) {
-  const filter = { kind: 'charged', robot_id: robots.join(','), from_utime_us: from, to_utime_us: to };
+async function readCharged(period, robots, signal) {
+  const filter = { kind: 'charged', robot_id: robots.join(','), ...period };
   const { entries, next } = await newest('/v1/event-log', filter, mostStays, signal);
   const joule = entries.reduce((sum, { detail }) => sum + (detail.charged_j ?? 0), 0);
   return { stays: entries.length, joule, whole: !next };
 }
 
-// Null until it is read. `period`: [from, to] in microseconds.
-function useCharged(period, robots) {
-  const key = JSON.stringify([period, robots]);
-  const { value, path } = useRead((signal) => readCharged(period, robots, signal), key);
-  return path === key ? value : null;
-}
-
 // The sums of the period with their changes, the energy charged, and its excess over that used by missions.
 function Sums({ now, before, period, robots }) {
   const tariff = useTariff();
-  const charged = useCharged(Object.values(period), robots);
+  const key = JSON.stringify([period, robots]);
+  const charged = useRead((signal) => readCharged(period, robots, signal), key);
   const used = joule(now);
   const worth = worthOf(tariff, used);
   const changed = (label, value, of) => {
@@ -246,7 +240,7 @@ function Sums({ now, before, period, robots }) {
     const known = a > 0 && b !== null;
     return [label, of(b), known && `${format.signed(format.share(b / a - 1))} against the compared period`];
   };
-  const { stays, joule: put, whole } = charged ?? {};
+  const { stays, joule: put, whole } = (charged.path === key && charged.value) || {};
   const notes = [`in ${format.count(stays, 'stay')}`, ...worthTexts(tariff, put)].join(', ');
   const rows = [
     changed('Energy', joule, energy),
@@ -336,29 +330,9 @@ function DrivenField(more) {
   return <SomeRobots ids={groups.map(({ robots: [id] }) => id)} none="the fleet" {...more} />;
 }
 
-function Fields({ given, change: set, kind, missions }) {
-  const field = fieldsOf(given, set);
-  if (missions) return <MissionsField {...field.of('missions')} />;
-  return (
-    <>
-      <DrivenField {...field.of('robot')} />
-      <Choice
-        label="Period"
-        value={given.from || given.to ? '' : (given.last ?? String(defaultDays[kind]))}
-        onChange={(last) => set({ last, from: '', to: '' })}
-        options={lasts}
-      />
-      {field.day('From', 'from')}
-      {field.day('To', 'to')}
-      {field.day('Compared from', 'from2')}
-      {field.day('Compared to', 'to2')}
-      <Choice label="Sums by" {...field.of('by', kind)} options={{ day: 'By day', week: 'By week' }} />
-    </>
-  );
-}
-
 export function Trends({ given: asked }) {
   const [given, set] = useChoices(asked);
+  const field = fieldsOf(given, set);
   const kind = given.by === 'week' ? 'week' : 'day';
   const missions = given.of === 'missions';
   const robots = given.robot ? given.robot.split(',') : [];
@@ -381,11 +355,28 @@ export function Trends({ given: asked }) {
       <Filters label="Filter trends">
         <Choice
           label="Of"
-          {...fieldsOf(given, set).of('of', missions ? 'missions' : '')}
+          {...field.of('of', missions ? 'missions' : '')}
           options={{ '': 'Periods and robots', missions: 'Missions' }}
         />
-        <Fields given={given} change={set} kind={kind} missions={missions} />
-        {!missions && <Export of={[csvOf(totalsPath(summed), 'trends')]} disabled={none} />}
+        {missions ? (
+          <MissionsField {...field.of('missions')} />
+        ) : (
+          <>
+            <DrivenField {...field.of('robot')} />
+            <Choice
+              label="Period"
+              value={given.from || given.to ? '' : (given.last ?? String(defaultDays[kind]))}
+              onChange={(last) => set({ last, from: '', to: '' })}
+              options={lasts}
+            />
+            {field.day('From', 'from')}
+            {field.day('To', 'to')}
+            {field.day('Compared from', 'from2')}
+            {field.day('Compared to', 'to2')}
+            <Choice label="Sums by" {...field.of('by', kind)} options={{ day: 'By day', week: 'By week' }} />
+            <Export of={[csvOf(totalsPath(summed), 'trends')]} disabled={none} />
+          </>
+        )}
       </Filters>
       {none && <Misordered />}
       {missions && ids.length === 0 && <p class="note">Choose two or more missions.</p>}
