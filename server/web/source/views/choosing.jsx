@@ -146,7 +146,7 @@ export function Several({ label, one, value, onChange, options, none }) {
   return (
     <div class="field">
       <span>{label}</span>
-      <span class="row wrap chips">
+      <span class="row wrap with-unit">
         {chosen.map((id) => (
           <button
             key={id}

@@ -1,20 +1,19 @@
 import sections from '../help.md';
 import { Heading } from '../widgets.jsx';
 
-const Terms = ({ of }) => (
-  <dl class="glossary">
-    {of.map(([term, to, words]) => (
-      <div key={words}>
-        <dt>{to ? <a href={to}>{term}</a> : term}</dt>
-        <dd>{words}</dd>
-      </div>
-    ))}
-  </dl>
-);
-
-export function Help() {
-  return sections.map(({ title, terms, text }, k) => [
+export const Help = () =>
+  sections.map(({ title, terms, text }, k) => [
     k === 0 ? <Heading title={title} /> : <h2>{title}</h2>,
-    text ? <p>{text}</p> : <Terms of={terms} />,
+    text ? (
+      <p>{text}</p>
+    ) : (
+      <dl class="glossary">
+        {terms.map(([term, to, words]) => (
+          <div key={words}>
+            <dt>{to ? <a href={to}>{term}</a> : term}</dt>
+            <dd>{words}</dd>
+          </div>
+        ))}
+      </dl>
+    ),
   ]);
-}
