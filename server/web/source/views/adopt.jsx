@@ -12,12 +12,10 @@ import { Changes, changesOf } from './changes.jsx';
 import { SelectField } from './choosing.jsx';
 import { effectName, rangeOf, share } from './jobs.jsx';
 
-const TestedMission = ({ id, mission_id: name, basis }) => (
-  <>
-    <a href={missionLink(id)}>{name}</a>
-    {basis === 'motors' && <span class="note"> at the motors</span>}
-  </>
-);
+const missionCell = ({ id, mission_id: name, basis }) => [
+  <a href={missionLink(id)}>{name}</a>,
+  basis === 'motors' && <span class="note"> at the motors</span>,
+];
 
 function TestTable({ missions }) {
   const errors = missions.flatMap((m) => [Math.abs(m.before.relative), Math.abs(m.after.relative)]);
@@ -35,7 +33,7 @@ function TestTable({ missions }) {
       { class: 'wide bar-cell' },
     );
   const columns = [
-    column('mission', 'Mission', TestedMission, { head: true }),
+    column('mission', 'Mission', missionCell, { head: true }),
     figure('measured', 'Measured', (m) => energyIn(scale, m.measured_j)),
     error('before', 'Error before'),
     bar('before', 'plain'),

@@ -42,20 +42,16 @@ export const ownPart = (missionId, robotId) =>
 
 function Power({ state: s }) {
   const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
-  return (
-    <>
-      <Quantity of={format.power(health.powerNow(s))} />
-      {modelledOnly && <span class="below">modelled</span>}
-    </>
-  );
+  return [
+    <Quantity of={format.power(health.powerNow(s))} />,
+    modelledOnly && <span class="below">modelled</span>,
+  ];
 }
 
-const Range = ({ state: s }) => (
-  <>
-    <Quantity of={format.kilometres(s.range_m)} />
-    <span class="below">{health.between(s.range_quantiles_m, format.lengthBand)}</span>
-  </>
-);
+const Range = ({ state: s }) => [
+  <Quantity of={format.kilometres(s.range_m)} />,
+  <span class="below">{health.between(s.range_quantiles_m, format.lengthBand)}</span>,
+];
 
 const Mission = ({ id, state: { mission, live } }) =>
   mission ? (

@@ -119,14 +119,10 @@ function Start({ given, onStart }) {
         Diagnose
       </Button>
       <p class="note" role="status">
-        {count === 0 ? (
-          <>{chosen} has no finished mission yet: there is nothing to diagnose.</>
-        ) : (
-          <>
-            {count !== null && `${format.count(count, 'finished mission')}. `}
-            Every fourth is held out to test the result.
-          </>
-        )}
+        {count > 0 && `${format.count(count, 'finished mission')}. `}
+        {count === 0
+          ? `${chosen} has no finished mission yet: there is nothing to diagnose.`
+          : 'Every fourth is held out to test the result.'}
       </p>
       {error && <Failure error={error} />}
     </form>

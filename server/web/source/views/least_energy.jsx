@@ -134,11 +134,7 @@ async function readLeastDrive(mission, driven, signal) {
 
 function Saving({ share }) {
   if (share > 0.005)
-    return (
-      <>
-        The least energy for these legs is <b>{format.share(share, 1)}</b> below the modelled.
-      </>
-    );
+    return ['The least energy for these legs is ', <b>{format.share(share, 1)}</b>, ' below the modelled.'];
   return share > -0.005
     ? 'This drive used about as little energy as the model allows.'
     : 'Less energy than these legs need with stops between them: the robot turned while it drove.';

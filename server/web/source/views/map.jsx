@@ -49,17 +49,13 @@ function poseAt({ t, rows }, second) {
   return [x0 + part * (x1 - x0), y0 + part * (y1 - y0), Math.atan2(y1 - rows[back][1], x1 - rows[back][0])];
 }
 
-function Name({ of: { mission }, colour }) {
-  return (
-    <>
-      <span class={`swatch ${colour}`} />
-      <a href={missionLink(mission.id)}>{mission.mission_id}</a>
-    </>
-  );
-}
+const nameCell = ({ of: { mission }, colour }) => [
+  <span class={`swatch ${colour}`} />,
+  <a href={missionLink(mission.id)}>{mission.mission_id}</a>,
+];
 
 const playedColumns = [
-  column('mission', 'Mission', Name, { head: true }),
+  column('mission', 'Mission', nameCell, { head: true }),
   figure('power', 'Power', (row) => format.power(powerAt(row.of.trace, row.k))),
   figure('speed', 'Speed', ({ of, k }) => format.unit(of.trace.speed_m_s.mean[k], 'm/s', 2)),
   figure('charge', 'Charge', ({ of, k }) => format.percent(of.trace.state_of_charge[k], 1)),

@@ -210,22 +210,6 @@ function Drives({ drives }) {
   return <Table class="chances" columns={columns} rows={drives} />;
 }
 
-function Explanation({ answer, autonomy: a, planned }) {
-  const reasons = [
-    `it is a forecast from ${bases[a.consumption.basis](a.consumption)}`,
-    a.pace.pause_s > 0.05 &&
-      `it includes the usual pause of ${format.fixed(a.pace.pause_s, 1)} s at each stop`,
-  ].filter(Boolean);
-  return (
-    <p class="note">
-      Least energy ({format.text(energy(answer.energy_j))}) is the model’s optimum for this path. The expected
-      energy
-      {planned && ` (${format.text(energy(planned.expected_energy_j))})`} is what the robot will probably use:{' '}
-      {reasons.join(', and ')}.
-    </p>
-  );
-}
-
 function drivesOf({ plan: usual, minimum_energy: planned, consumption }) {
   const who = consumption.missions > 0 ? 'it usually drives' : 'robots usually drive';
   return [
@@ -249,6 +233,12 @@ export function PlanVerdict({ answer, autonomy }) {
   const [first] = drives;
   const [, words, name] = verdicts.find(([least]) => first.success_probability >= least);
   const times = first.expected_energy_j > 0 ? Math.floor(a.usable_energy_j / first.expected_energy_j) : 0;
+  const planned = a.minimum_energy;
+  const reasons = [
+    `it is a forecast from ${bases[a.consumption.basis](a.consumption)}`,
+    a.pace.pause_s > 0.05 &&
+      `it includes the usual pause of ${format.fixed(a.pace.pause_s, 1)} s at each stop`,
+  ].filter(Boolean);
   const sd = a.state_of_charge_sd > 0.0005 ? ` ± ${percent(a.state_of_charge_sd)}` : '';
   return (
     <div class={`verdict-box ${name}`}>
@@ -263,7 +253,12 @@ export function PlanVerdict({ answer, autonomy }) {
         {times >= 2 ? `: about ${format.fixed(Number(times.toPrecision(2)))} such drives` : ''}.{' '}
         {a.state_of_charge_limitation}
       </p>
-      <Explanation answer={answer} autonomy={a} planned={a.minimum_energy} />
+      <p class="note">
+        Least energy ({format.text(energy(answer.energy_j))}) is the model’s optimum for this path. The
+        expected energy
+        {planned && ` (${format.text(energy(planned.expected_energy_j))})`} is what the robot will probably
+        use: {reasons.join(', and ')}.
+      </p>
     </div>
   );
 }

@@ -105,21 +105,6 @@ function SilenceNote({ state }) {
   );
 }
 
-function Head({ id, state }) {
-  return (
-    <Heading title={id} crumbs={<a href="#/fleet">Fleet</a>}>
-      {state && (
-        <span class="row wrap health">
-          <health.Health state={state} />
-        </span>
-      )}
-      <span class="spring" />
-      {state?.has_model && <Button href={`#/robot-file/${idPath(id)}`}>Edit</Button>}
-      <Button href={`#/plan${query({ robot: id })}`}>Plan a drive</Button>
-    </Heading>
-  );
-}
-
 function RecentMissions({ id, running }) {
   const missions = useGet(`/v1/missions${query({ robot_id: id, limit: recentRows })}`, running);
   return (
@@ -219,7 +204,16 @@ export function Robot({ id }) {
     );
   return (
     <>
-      <Head id={id} state={s} />
+      <Heading title={id} crumbs={<a href="#/fleet">Fleet</a>}>
+        {s && (
+          <span class="row wrap health">
+            <health.Health state={s} />
+          </span>
+        )}
+        <span class="spring" />
+        {s?.has_model && <Button href={`#/robot-file/${idPath(id)}`}>Edit</Button>}
+        <Button href={`#/plan${query({ robot: id })}`}>Plan a drive</Button>
+      </Heading>
       {s && <SilenceNote state={s} />}
       <health.Reasons
         of={attention.get(id)}
