@@ -100,8 +100,8 @@ function Evidence({ of: { back_test: test, forced, diagnosis_id: id } }) {
       : 'Not tested: there was no mission to test it on.';
   return (
     <p class="note">
-      {id && ['From ', <a href={`#/gap/${id}`}>diagnosis {id}</a>, '. ']}
-      {tested} {forced && <span class="flag">forced</span>}
+      {id && ['From ', <a href={`#/gap/${id}`}>diagnosis {id}</a>, '.']} {tested}{' '}
+      {forced && <span class="flag">forced</span>}
     </p>
   );
 }
