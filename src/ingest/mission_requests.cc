@@ -32,8 +32,7 @@ Result<std::vector<MissionRequest>> stored_mission_requests(const history::Store
   for (const nlohmann::json& each : all) {
     requests.push_back({{each.at("utime_us").get<std::int64_t>(), each.at("mission_id").get<std::string>(),
                          static_cast<signals::MissionPhase>(each.at("phase").get<int>()),
-                         number_or_nan(each.at("payload_kg")),
-                         each.at("note").get<std::string>()},
+                         number_or_nan(each.at("payload_kg")), each.at("note").get<std::string>()},
                         each.at("request_utime_us").get<std::int64_t>()});
   }
   return requests;
