@@ -180,9 +180,9 @@ TEST_F(PipelineTest, CovariatesAloneOpenNoMission) {
   // Without a tick: accumulated changes are stored.
   EXPECT_GE(changes(harness.missions()[0].key).size(), 2048u);
   harness.pipeline->tick(start_us);
-  EXPECT_EQ(harness.store->covariates(harness.missions()[0].key, {}, {.limit = 10'000, .cursor = {}})
-                ->changes.size(),
-            3001u);
+  EXPECT_EQ(
+      harness.store->covariates(harness.missions()[0].key, {}, {.limit = 10'000, .cursor = {}})->items.size(),
+      3001u);
 }
 
 TEST_F(PipelineTest, HeightDeterminesTheGrade) {
