@@ -98,12 +98,11 @@ void ChargeFilter::advance(double current_a, double duration_s, double current_s
   if (!(duration_s > 0)) return;
   const double true_a = current_a - x_[at_bias];
   const State before = state();
-  const State after = circuit_.advanced(before, true_a, duration_s, reference_temperature_c);
+  const State after = circuit_.advanced(before, true_a, duration_s, temperature_c_);
   // All moves are linear in state and current; differences of one ampere give the derivatives exactly but for
   // the coulombic efficiency, which changes where the current turns.
-  const State one = circuit_.advanced(before, true_a + 1, duration_s, reference_temperature_c);
-  const State kept =
-      circuit_.advanced({0, {1, 1}, {1, 1}, reference_temperature_c}, 0, duration_s, reference_temperature_c);
+  const State one = circuit_.advanced(before, true_a + 1, duration_s, temperature_c_);
+  const State kept = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
 
   Matrix f = Matrix::Identity();
   Vector by_current = Vector::Zero();
@@ -148,7 +147,7 @@ void ChargeFilter::advance(double current_a, double duration_s, double current_s
 }
 
 State ChargeFilter::state() const {
-  return state_of(x_, reference_temperature_c);
+  return state_of(x_, temperature_c_);
 }
 
 double ChargeFilter::drop_v(const State& at, double current_a, double factor) const {
@@ -164,7 +163,7 @@ ChargeFilter::Linear ChargeFilter::linearise(const Vector& x, const Matrix& p, d
   const double spread = std::sqrt(std::max(1e-12, surface.dot(p * surface)));
   const double true_a = current_a - x[at_bias];
   const double factor = std::exp(x[at_factor]);
-  const State at = state_of(x, reference_temperature_c);
+  const State at = state_of(x, temperature_c_);
 
   std::array<double, nodes.size()> volts{};
   double mean_v = 0, slope = 0;
@@ -208,8 +207,8 @@ double ChargeFilter::charge_at(double voltage_v, double current_a) const {
 // The current before the first reading is unknown; it was probably similar to the first one.
 void ChargeFilter::begin(double current_a) {
   const double sd_a = 0.5 * std::abs(current_a) + trust_.unknown_current_per_h * circuit_.capacity_ah();
-  const State mean = circuit_.advanced({}, 0.5 * current_a, seconds_per_hour, reference_temperature_c);
-  const State spread = circuit_.advanced({}, sd_a, seconds_per_hour, reference_temperature_c);
+  const State mean = circuit_.advanced({}, 0.5 * current_a, seconds_per_hour, temperature_c_);
+  const State spread = circuit_.advanced({}, sd_a, seconds_per_hour, temperature_c_);
   for (Eigen::Index k = 0; k < 2; ++k) {
     const auto b = static_cast<std::size_t>(k);
     x_[at_branch + k] = mean.branch_current_a[b];
@@ -301,9 +300,8 @@ void ChargeFilter::correct(double voltage_v, double current_a, double more_noise
 
 void ChargeFilter::gap(double duration_s) {
   const double current_sd_a = trust_.unknown_current_per_h * circuit_.capacity_ah();
-  const State after =
-      circuit_.advanced({0, {1, 1}, {1, 1}, reference_temperature_c}, 0, duration_s, reference_temperature_c);
-  const State driven = circuit_.advanced({}, current_sd_a, duration_s, reference_temperature_c);
+  const State after = circuit_.advanced({0, {1, 1}, {1, 1}, temperature_c_}, 0, duration_s, temperature_c_);
+  const State driven = circuit_.advanced({}, current_sd_a, duration_s, temperature_c_);
   const auto relax = [&](Eigen::Index at, double keep, double variance) {
     x_[at] *= keep;
     p_.row(at) *= keep;

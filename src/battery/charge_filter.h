@@ -67,6 +67,8 @@ class ChargeFilter {
   // Advances over a time in which nothing was measured: the current is unknown.
   void gap(double duration_s);
 
+  void set_temperature_c(double temperature_c) { temperature_c_ = temperature_c; }
+
   bool known() const { return known_; }  // a voltage or an observation came since it was forgotten
   double charge() const;                 // 0 to 1, of the present capacity
   double charge_sd() const;
@@ -110,6 +112,7 @@ class ChargeFilter {
   double begun_v_ = 0;           // the one that the estimate began with; NaN after a restart
   double resistance_sd_;
   double bias_sd_a_;
+  double temperature_c_ = reference_temperature_c;
   Vector x_;  // mean
   Matrix p_;  // covariance
   bool known_ = false;

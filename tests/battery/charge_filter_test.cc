@@ -171,6 +171,7 @@ Statistics follow(const robot::Battery& battery, const std::vector<Recording>& d
       drawn_ah += r.current_a[row] * seconds / 3600;
       const double since_s = r.time_s[row] - r.time_s[0] - skipped_s;
       if (since_s < 0) continue;
+      filter.set_temperature_c(r.temperature_c[row]);
       filter.advance(r.current_a[row] + bias_a, seconds);
       filter.correct(r.voltage_v[row], r.current_a[row] + bias_a);
       const double error = filter.charge() - (1 - drawn_ah / filter.circuit().capacity_ah());
