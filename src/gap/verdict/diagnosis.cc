@@ -1,5 +1,3 @@
-#include "gap/verdict/answer.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 
 #include "gap/traits.h"
 #include "gap/verdict/adopt.h"
+#include "gap/verdict/answer.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/words.h"
 
