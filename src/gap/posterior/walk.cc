@@ -142,7 +142,8 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
     last_set = set;
     last = now;
     const Eigen::VectorXd target = joined(*fit, now);
-    if (fit->data.motors || !fit->data.power) {
+    // Only power at the battery tells how far a step leads.
+    if (!fit->data.power || !fit->data.rows.meter.empty()) {
       point = target;
       continue;
     }

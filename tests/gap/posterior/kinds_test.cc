@@ -284,6 +284,40 @@ TEST(NoisySpeed, MassIsNotAttenuated) {
   EXPECT_NEAR(share, 0, 0.1);
 }
 
+// Currents of the motors, a sloping floor and noise of the speeds. A step of the linear equations to a payload
+// and an inertia in place of the grade predicts power worse than the file does.
+TEST(NoisySpeed, GradeIsNoPayload) {
+  Drives drives(36);
+  const dynamics::DriveModel model(drives.robot, std::vector{effect_of("grade", 1)});
+  telemetry::RecordingSet recordings = drives.recordings();
+  std::mt19937_64 random(36);
+  std::normal_distribution<double> noise(0, 0.02);
+  for (telemetry::Recording& mission : recordings.missions) {
+    for (signals::Sample& s : mission.samples) {
+      const double t = 1e-6 * static_cast<double>(s.utime_us % 1'000'000'000);
+      const auto speed = [&](std::size_t side, double at) { return Drives::speed(at, side); };
+      s.pitch_rad = 0.05 * std::sin(t / 7);
+      dynamics::Instant at;
+      at.climb_rad = s.pitch_rad;
+      for (const std::size_t k : {0u, 1u}) {
+        at.wheel_speed_rad_s[k] = speed(k, t);
+        at.wheel_acceleration_rad_s2[k] = (speed(k, t + 1e-3) - speed(k, t - 1e-3)) / 2e-3;
+        s.wheel_velocity_rad_s[k] = at.wheel_speed_rad_s[k] + noise(random);
+      }
+      const auto flow = model.flow(at);
+      s.motor_current_a = flow.current_a;
+      for (const std::size_t k : {0u, 1u}) s.motor_voltage_v[k] = model.voltage_for(k, flow.current_a[k], at);
+      s.battery_current_a = (flow.battery_power_w + 50 * noise(random)) / s.battery_voltage_v;
+    }
+  }
+  const auto fit = fit_missions(recordings.missions, drives.robot);
+  ASSERT_TRUE(fit);
+  EXPECT_LT(missed((*fit)->data, power_of(**fit, (*fit)->equations.point)), 0.5 * (*fit)->gap);
+  const auto a = explain(**fit);
+  EXPECT_TRUE(names(a, "grade"));
+  EXPECT_FALSE(names(a, "payload_mass_error"));
+}
+
 struct Offer {
   double regression, explanation;
   bool adopts;
