@@ -49,9 +49,9 @@ struct CalibratedMission {
   std::string mission_id;
   bool trained_on = false;
   bool at_battery = false;
-  double measured_j = 0;
-  double before_j = 0;  // by the robot file as given
-  double after_j = 0;   // by the calibrated one
+  double measured_j = 0;  // NaN: not measured
+  double before_j = 0;    // by the robot file as given
+  double after_j = 0;     // by the calibrated one
 
   double error_before() const { return before_j / measured_j - 1; }
   double error_after() const { return after_j / measured_j - 1; }
@@ -158,7 +158,9 @@ Result<void> account(const robot::RobotModel& robot, std::span<const energy::Dri
     TRY_ASSIGN(const auto before, energy::metered(robot, run_drive, meter));
     TRY_ASSIGN(const auto after, energy::metered(outcome.robot(), run_drive, meter));
     CalibratedMission c{run_drive.name, train.contains(run_drive.name), after.measured_s > 0};
-    c.measured_j = c.at_battery ? after.measured_j : after.measured_motor_j[0] + after.measured_motor_j[1];
+    c.measured_j = c.at_battery                 ? after.measured_j
+                   : after.motor_measured_s > 0 ? after.measured_motor_j[0] + after.measured_motor_j[1]
+                                                : signals::unmeasured;
     c.before_j = c.at_battery ? before.modelled_j : before.modelled_motor_j[0] + before.modelled_motor_j[1];
     c.after_j = c.at_battery ? after.modelled_j : after.modelled_motor_j[0] + after.modelled_motor_j[1];
     outcome.missions.push_back(c);
@@ -212,14 +214,15 @@ void add_block(Json& document, const energy::PowerCalibration& fit) {
 }
 
 void print(const energy::DriveCalibration& fit) {
-  fmt::print("from {} windows, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m rms\n",
-             fit.windows, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
+  const bool volts = std::isfinite(fit.voltage_rms_v);
+  fmt::print("from {} windows, wheels at {:.2f} to {:.2f} rad/s; residuals {}{:.3g} N m rms\n", fit.windows,
+             fit.slowest_rad_s, fit.fastest_rad_s, volts ? fmt::format("{:.3g} V, ", fit.voltage_rms_v) : "",
+             fit.torque_rms_nm);
   if (fit.electrical_delay_s != 0)
     fmt::print(
         "Voltages and currents are {:.1f} ms apart, as if read at one phase of a controller's period. Record "
         "their means; the standard errors of the inertias include this error.\n",
         1e3 * std::fabs(fit.electrical_delay_s));
-  fmt::print("\n");
 }
 
 void print(const energy::PowerCalibration& fit) {
@@ -242,7 +245,6 @@ void print(const energy::PowerCalibration& fit) {
   for (const energy::Untold& u : fit.untold)
     if (std::ranges::find(fit.estimates, u.what, &energy::ParameterEstimate::name) == fit.estimates.end())
       fmt::print("- {}: {}.\n", u.what, u.why);
-  fmt::print("\n");
 }
 
 Json drive_json(const DriveOutcome& outcome) {
@@ -265,7 +267,7 @@ Json drive_json(const DriveOutcome& outcome) {
     document["missions"].push_back({{"mission_id", c.mission_id},
                                     {"trained_on", c.trained_on},
                                     {"measured_at", c.at_battery ? "battery" : "motors"},
-                                    {"measured_j", c.measured_j},
+                                    {"measured_j", json_number(c.measured_j)},
                                     {"file_j", c.before_j},
                                     {"calibrated_j", c.after_j},
                                     {"file_error", json_number(c.error_before())},
@@ -282,11 +284,17 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
     fmt::print(" {:<10} {}\n", e.unit, e.note);
   }
   outcome.by_motors ? print(*outcome.by_motors) : print(*outcome.by_power);
+  if (outcome.by_motors && std::ranges::any_of(outcome.missions, &CalibratedMission::at_battery))
+    fmt::print(
+        "Idle power, scrub and regeneration are the robot file's: --method power estimates them from battery "
+        "power.\n");
+  fmt::print("\n");
   const Column used =
       text_column("used", [](const Json& row) { return row["trained_on"] == true ? "to fit" : "to test"; });
   const auto error = [](const char* member) {
     return text_column("error", [member](const Json& row) {
-      return without_sign_of_zero(fmt::format("{:+.1f} %", 1e2 * number_or_nan(row[member])));
+      const double share = number_or_nan(row[member]);
+      return std::isfinite(share) ? without_sign_of_zero(fmt::format("{:+.1f} %", 1e2 * share)) : "-";
     });
   };
   print_rows(drive_json(outcome)["missions"], {{"mission", "mission_id"},
@@ -300,7 +308,7 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
   std::size_t unused = 0;
   double total = 0, missed = 0, missed_before = 0;
   for (const CalibratedMission& c : outcome.missions) {
-    if (c.trained_on) continue;
+    if (c.trained_on || std::isnan(c.measured_j)) continue;
     ++unused;
     total += c.measured_j;
     missed += std::fabs(c.after_j - c.measured_j);

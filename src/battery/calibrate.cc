@@ -26,10 +26,18 @@ constexpr double activation_unit_k = 1000;  // the fit's parameters are all of o
 
 // ---- the slow discharge ----
 
+// More current than at rest, by what the recording discharges. Sensors have zeros of a few mA.
+double flowing_a(const Recording& recording) {
+  double discharged_ah = 0;
+  for (std::size_t row = 1; row < recording.size(); ++row)
+    discharged_ah += std::max(recording.current_a[row], 0.0) * recording.duration_s(row) / 3600;
+  return flowing_share * discharged_ah;
+}
+
 // The first interval without charging; a test that was recharged in the same file ends there.
 Recording without_charging(const Recording& recording) {
-  const double flowing_a = 1e-3 * *std::max_element(recording.current_a.begin(), recording.current_a.end());
-  const auto charges = [&](double current_a) { return current_a < -flowing_a; };
+  const double flowing = flowing_a(recording);
+  const auto charges = [&](double current_a) { return current_a < -flowing; };
   const auto begin = std::find_if_not(recording.current_a.begin(), recording.current_a.end(), charges);
   const auto end = std::find_if(begin, recording.current_a.end(), charges);
   return recording.rows(begin - recording.current_a.begin(), end - recording.current_a.begin());
@@ -37,10 +45,10 @@ Recording without_charging(const Recording& recording) {
 
 // Without the rest before and after, but for one row before.
 Recording without_rests(const Recording& recording) {
-  const double flowing_a = 1e-3 * *std::max_element(recording.current_a.begin(), recording.current_a.end());
+  const double flowing = flowing_a(recording);
   auto first = recording.current_a.begin() + 1, last = recording.current_a.end();
-  while (first + 1 < last && !(*first > flowing_a)) ++first;
-  while (last > first + 1 && !(*(last - 1) > flowing_a)) --last;
+  while (first + 1 < last && !(*first > flowing)) ++first;
+  while (last > first + 1 && !(*(last - 1) > flowing)) --last;
   return recording.rows(first - recording.current_a.begin() - 1, last - recording.current_a.begin());
 }
 

@@ -89,7 +89,8 @@ Result<std::vector<fs::path>> chosen_files(const std::string& file_or_prefix, co
   if (!whole_folder || first == last) return found;
   return invalid(
       file_or_prefix,
-      fmt::format("holds tests of several batteries, {} to {}: name one by the beginning of its files, as {}",
+      fmt::format("holds tests of several batteries, {} to {}, by what precedes the first _ in the names of "
+                  "their files: name one by the beginning of its files, as {}",
                   first, last, (fs::path(file_or_prefix) / first).string()));
 }
 

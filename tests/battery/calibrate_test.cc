@@ -63,7 +63,8 @@ TEST(Calibrate, IgnoresRestsAndRecharge) {
     r.voltage_v.insert(r.voltage_v.begin() + i, voltage_v);
     r.temperature_c.insert(r.temperature_c.begin() + i, 25);
   };
-  for (int k = 1; k <= 30; ++k) row(slow, 0, -60.0 * k, 0, truth.open_circuit_voltage_v(1));
+  // A current sensor's zero is not exact.
+  for (int k = 1; k <= 30; ++k) row(slow, 0, -60.0 * k, k % 2 ? 0 : -1e-3, truth.open_circuit_voltage_v(1));
   const double end_s = slow.time_s.back(), end_v = slow.voltage_v.back();
   for (int k = 1; k <= 30; ++k) row(slow, slow.size(), end_s + 60 * k, 0, end_v + 0.1);
   for (int k = 31; k <= 90; ++k) row(slow, slow.size(), end_s + 60 * k, -1, end_v + 0.3);

@@ -284,8 +284,8 @@ TEST(NoisySpeed, MassIsNotAttenuated) {
   EXPECT_NEAR(share, 0, 0.1);
 }
 
-// Currents of the motors, a sloping floor and noise of the speeds. A step of the linear equations to a payload
-// and an inertia in place of the grade predicts power worse than the file does.
+// Currents of the motors, a sloping floor and noise of the speeds. A step of the linear equations to a
+// payload and an inertia in place of the grade predicts power worse than the file does.
 TEST(NoisySpeed, GradeIsNoPayload) {
   Drives drives(36);
   const dynamics::DriveModel model(drives.robot, std::vector{effect_of("grade", 1)});
