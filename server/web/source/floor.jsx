@@ -267,7 +267,10 @@ export function FloorPath({
       strokeThrough(c, ...view.to(...shown[k - 1]), ...view.to(...shown[k]));
     }
     if (shown.length > 1 && ends) drawEnds(c, view, shown);
-    if (robot) drawRobot(c, view, ...robot, palette().ink);
+    if (robot) {
+      const [x, y, heading] = robot;
+      drawRobot(c, view, x, y, heading ?? 0, palette().ink);
+    }
     const at = points[cursor];
     if (at && Number.isFinite(at[0])) {
       const [px, py] = view.to(at[0], at[1]);

@@ -45,7 +45,7 @@ export function Head({ columns, sort, onSort }) {
               <button type="button" onClick={() => onSort(c.key)}>
                 {c.title}
                 <span class="arrow" aria-hidden="true">
-                  {c.key === sort.key ? (sort.down ? '▾' : '▴') : ''}
+                  {c.key === sort?.key ? (sort.down ? '▾' : '▴') : ''}
                 </span>
               </button>
             ) : (

@@ -167,8 +167,8 @@ export const Options = ({ of }) =>
   useMemo(
     () =>
       of
-        .map((id) => [id].flat())
-        .map(([id, name = id]) => (
+        .map((each) => (Array.isArray(each) ? each : [each, each]))
+        .map(([id, name]) => (
           <option key={id} value={id}>
             {name}
           </option>

@@ -44,7 +44,9 @@ export function DrawPath({ points, change }) {
     const here = points[held.current];
     if (here && (here[0] !== point[0] || here[1] !== point[1])) change(points.with(held.current, point));
   };
-  const up = () => void (held.current = null);
+  const up = () => {
+    held.current = null;
+  };
   const key = (event) => {
     const step = event.shiftKey ? 4 * snapM : snapM;
     const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[
