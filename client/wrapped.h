@@ -6,7 +6,7 @@
 
 namespace joulecast::client {
 
-// Columns of the terminal that `file` is, a descriptor; `otherwise` where it is none.
+// Columns of the terminal at the file descriptor `file`; `otherwise` if it is no terminal.
 [[nodiscard]] std::size_t terminal_columns(int file, std::size_t otherwise);
 // Those of standard output, 60 to 100; 100 where it is no terminal, for equal files.
 [[nodiscard]] std::size_t help_width();

@@ -291,7 +291,8 @@ AllSeries robot_series(const ingest::FleetView& fleet, const GapWatch& watch, st
     const bool is_live = api::is_live(robot, now_utime_us);
     add(live, is_live ? 1 : 0);
     if (robot.received_utime_us > 0)
-      add(silent, static_cast<double>(now_utime_us - robot.received_utime_us) * 1e-6);
+      add(silent,
+          1e-6 * static_cast<double>(std::max<std::int64_t>(0, now_utime_us - robot.received_utime_us)));
     if (is_live) add(power, robot.measured_power_w);
     if (is_live) add(modelled, robot.modelled_power_w);
     add(charge, robot.state_of_charge);

@@ -13,7 +13,7 @@
 
 namespace joulecast::server {
 
-// The data of the event `mission` of one that has ended.
+// The data of the event `mission`, for a mission that has ended.
 std::string mission_event(const history::Mission& mission);
 
 // Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot,

@@ -39,6 +39,7 @@ class Metrics {
     Series(std::string metric, std::string meaning, Number value)
         : name(std::move(metric)), help(std::move(meaning)), rows{{{}, static_cast<double>(value)}} {}
   };
+  // What `read` refers to must outlive the last text().
   void series(std::function<std::vector<Series>()> read);
 
   // Prometheus text exposition format 0.0.4.

@@ -161,9 +161,8 @@ void add_calibrate(CLI::App& program, Exit& exit) {
       "full discharge, pulses and constant currents",
       run_calibrate,
       {{"recordings", &O::sources,
-        "CSV files, a folder of one battery's tests, or the common beginning of their names, which ends at "
-        "their first _: <beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is left for "
-        "battery predict. "
+        "CSV files, a folder of one battery's tests, or the common beginning of their names: "
+        "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is left for battery predict. "
         "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
         "open-circuit voltage",
         file_of("csv"), required},

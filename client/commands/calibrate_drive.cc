@@ -49,10 +49,13 @@ struct CalibratedMission {
   std::string mission_id;
   bool trained_on = false;
   bool at_battery = false;
-  double measured_j = 0;  // NaN: not measured
-  double before_j = 0;    // by the robot file as given
-  double after_j = 0;     // by the calibrated one
+  double measured_j = signals::unmeasured;
+  double before_j = 0;  // by the robot file as given
+  double after_j = 0;   // by the calibrated one
 
+  Json measured_at() const {
+    return at_battery ? Json("battery") : std::isnan(measured_j) ? Json() : Json("motors");
+  }
   double error_before() const { return before_j / measured_j - 1; }
   double error_after() const { return after_j / measured_j - 1; }
 };
@@ -158,9 +161,10 @@ Result<void> account(const robot::RobotModel& robot, std::span<const energy::Dri
     TRY_ASSIGN(const auto before, energy::metered(robot, run_drive, meter));
     TRY_ASSIGN(const auto after, energy::metered(outcome.robot(), run_drive, meter));
     CalibratedMission c{run_drive.name, train.contains(run_drive.name), after.measured_s > 0};
-    c.measured_j = c.at_battery                 ? after.measured_j
-                   : after.motor_measured_s > 0 ? after.measured_motor_j[0] + after.measured_motor_j[1]
-                                                : signals::unmeasured;
+    if (c.at_battery)
+      c.measured_j = after.measured_j;
+    else if (after.motor_measured_s > 0)
+      c.measured_j = after.measured_motor_j[0] + after.measured_motor_j[1];
     c.before_j = c.at_battery ? before.modelled_j : before.modelled_motor_j[0] + before.modelled_motor_j[1];
     c.after_j = c.at_battery ? after.modelled_j : after.modelled_motor_j[0] + after.modelled_motor_j[1];
     outcome.missions.push_back(c);
@@ -266,7 +270,7 @@ Json drive_json(const DriveOutcome& outcome) {
   for (const CalibratedMission& c : outcome.missions)
     document["missions"].push_back({{"mission_id", c.mission_id},
                                     {"trained_on", c.trained_on},
-                                    {"measured_at", c.at_battery ? "battery" : "motors"},
+                                    {"measured_at", c.measured_at()},
                                     {"measured_j", json_number(c.measured_j)},
                                     {"file_j", c.before_j},
                                     {"calibrated_j", c.after_j},
@@ -305,10 +309,14 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
                                                error("file_error"),
                                                energy_column("fitted", "calibrated_j", unit),
                                                error("calibrated_error")});
-  std::size_t unused = 0;
+  std::size_t unused = 0, unmeasured = 0;
   double total = 0, missed = 0, missed_before = 0;
   for (const CalibratedMission& c : outcome.missions) {
-    if (c.trained_on || std::isnan(c.measured_j)) continue;
+    if (c.trained_on) continue;
+    if (std::isnan(c.measured_j)) {
+      ++unmeasured;
+      continue;
+    }
     ++unused;
     total += c.measured_j;
     missed += std::fabs(c.after_j - c.measured_j);
@@ -317,6 +325,7 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
   if (unused > 0)
     fmt::print("error on the {}: {:.1f} % of their energy; robot file {:.1f} %\n",
                count_of(unused, "held-out mission"), 1e2 * missed / total, 1e2 * missed_before / total);
+  if (unmeasured > 0) fmt::print("no energy was measured in {}\n", count_of(unmeasured, "held-out mission"));
 }
 
 Result<Exit> run_drive(CalibrateDriveOptions& options) {

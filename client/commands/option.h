@@ -11,7 +11,8 @@
 
 #include "base/error.h"
 
-// Commands as tables of options, each bound to a member of the command's struct of options.
+// Commands as tables of options, each bound to a member of the command's struct of options, and their exit
+// codes.
 namespace joulecast::client {
 
 // The program's exit codes; part of the command line's contract.
@@ -41,7 +42,7 @@ inline constexpr const char* exit_codes_help =
 Exit report(const Error& error);
 
 // The kind of an option's value. The name is printed in the help and selects the completion in a shell
-// (completion.h): "FILE.json", "ROBOT", "{usual,minimum_energy}".
+// (candidates() in table.h): "FILE.json", "ROBOT", "{usual,minimum_energy}".
 struct Value {
   std::string name = {};      // empty: by the type of the member
   std::string bounds = {};    // "0 to 1", for the help; empty: none

@@ -81,7 +81,8 @@ class Pacer {
   Clock::time_point earliest_;
 };
 
-// Reads a log until `take` returns false, and reports on standard error where and how it is damaged.
+// Reads a log until `take` returns false, and reports on standard error where and how it is damaged. False if
+// `take` ended it.
 Result<bool> read_log(const std::string& path, LogProgress& progress, telemetry::LogTally& tally,
                       const std::function<Result<bool>(const telemetry::LogEvent&)>& take) {
   const auto take_and_count = [&](const telemetry::LogEvent& event) -> Result<bool> {

@@ -22,8 +22,9 @@ using http_client::HttpReply;
 
 inline constexpr const char* accept_json = "application/json, application/problem+json, text/html;q=0.5";
 
-// http_client::exchange() with the `server` of --server, with the token of the environment's JOULECAST_TOKEN
-// and the certificate of the PEM file JOULECAST_CLIENT_CERTIFICATE, of the key in JOULECAST_CLIENT_KEY.
+// http_client::exchange() with the `server` of --server. The environment gives the token (JOULECAST_TOKEN)
+// and the PEM files of a client certificate (JOULECAST_CLIENT_CERTIFICATE) and its key
+// (JOULECAST_CLIENT_KEY).
 [[nodiscard]] Result<HttpReply> http_request(const std::string& server, HttpMethod method,
                                              std::string_view target, std::string json_body,
                                              std::chrono::milliseconds timeout,
@@ -32,7 +33,7 @@ inline constexpr const char* accept_json = "application/json, application/proble
 // The error of a reply other than 2xx: title and detail of its problem+json, and the fault of its status.
 [[nodiscard]] Error error_of(const HttpReply& reply);
 
-// Options of commands that ask a daemon.
+// Options that most commands of a daemon share; not every command has a row for each.
 struct ServerOptions {
   std::string server, robot_id, unit = energy_units.front();
   bool json = false;

@@ -69,8 +69,8 @@ class AttentionList {
   // Unacknowledged ones first, then the most urgent, then by robot id.
   std::vector<AttentionEntry> entries() const;
 
-  // Acknowledges the robot's reasons of the kind until they end, by `change`, which is answered with its
-  // entry. Fault::not_found of "kind" if the robot has no such reason.
+  // Acknowledges the robot's reasons of the kind until they end, by `change`, whose answer is the
+  // robot's entry. Fault::not_found of "kind" if the robot has no such reason.
   history::Outcome acknowledge(const std::string& robot_id, std::string_view kind, const Acknowledgement& by,
                                RequestChange& change);
 

@@ -42,7 +42,7 @@ std::optional<bool> was_forced(const history::ModelVersion& version) {
   return evidence.is_object() ? std::optional(evidence.value("forced", false)) : std::nullopt;
 }
 
-const auto adopted_version_table =
+const auto listed_version_table =
     Table<history::ModelVersion>()
         .value("model_version", AT(version), version_words)
         .time("created", AT(created_utime_us),
@@ -86,7 +86,7 @@ const auto gap_history_table =
         .list("missions", AT(missions), "measured over modelled energy of each mission, oldest first",
               ratio_table)
         .list("drift", AT(marks), "detected changes of the robot", answers::mark_table())
-        .list("versions", AT(versions), "versions of the model, newest first", adopted_version_table)
+        .list("versions", AT(versions), "versions of the model, newest first", listed_version_table)
         .list("siblings", AT(siblings), "robots of this kind, this one among them", sibling_table);
 
 Result<Response> gap_history(const Services& services, const Request& request) {

@@ -37,9 +37,10 @@ class EventHub {
   explicit EventHub(const Options& options);
   ~EventHub();
 
-  // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
-  // select (a robot's id; empty goes to all). Of states a slow client gets the topic's newest alone.
+  // A state outdates earlier ones of its topic: a slow client receives the newest only.
   enum class Of : std::uint8_t { occurrence, state };
+  // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
+  // select (a robot's id; empty goes to all).
   void publish(std::string_view event, std::string_view data, std::string_view topic = {},
                Of of = Of::occurrence);
 

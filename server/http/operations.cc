@@ -26,9 +26,9 @@ const auto version_table =
         .value("version", AT(version), "of the program", {{"pattern", R"(^[0-9]+\.[0-9]+\.[0-9]+)"}})
         .value("compiler", AT(compiler), "compiler of the program");
 
-// Upper bounds for request durations.
-const std::vector<double> bounds_s{50e-6, 100e-6, 250e-6, 500e-6, 1e-3, 2.5e-3, 5e-3, 10e-3,
-                                   25e-3, 50e-3,  100e-3, 250e-3, 0.5,  1.0,    2.5,  10.0};
+// Upper bounds of the histogram of request durations [s].
+const std::vector<double> request_seconds{50e-6, 100e-6, 250e-6, 500e-6, 1e-3, 2.5e-3, 5e-3, 10e-3,
+                                          25e-3, 50e-3,  100e-3, 250e-3, 0.5,  1.0,    2.5,  10.0};
 
 std::vector<prometheus::Counter*> refusal_counters(Metrics& metrics) {
   std::vector<prometheus::Counter*> made;
@@ -138,19 +138,21 @@ HttpMetrics::HttpMetrics(Metrics& metrics)
 }
 
 void HttpMetrics::exchanged(const Exchange& exchange) {
-  auto [place, fresh] = series_.try_emplace({exchange.operation.data(), exchange.status});
-  if (fresh) {
+  const std::pair key{exchange.operation.data(), exchange.status};
+  auto place = series_.find(key);
+  if (place == series_.end()) {
     const std::string operation(exchange.operation);
-    place->second.requests =
-        &metrics_.counter("joulecast_http_requests_total", "Requests answered",
-                          {{"operation", operation}, {"code", std::to_string(exchange.status)}});
-    place->second.duration =
-        &metrics_.histogram("joulecast_http_request_duration_seconds",
-                            "From the last byte of a request to the last byte of its answer", bounds_s,
-                            {{"operation", operation}});
+    prometheus::Counter& requests =
+        metrics_.counter("joulecast_http_requests_total", "Requests answered",
+                         {{"operation", operation}, {"code", std::to_string(exchange.status)}});
+    prometheus::Histogram& duration =
+        metrics_.histogram("joulecast_http_request_duration_seconds",
+                           "From the last byte of a request to the last byte of its answer", request_seconds,
+                           {{"operation", operation}});
+    place = series_.try_emplace(key, requests, duration).first;
   }
-  place->second.requests->Increment();
-  if (!exchange.stream) place->second.duration->Observe(exchange.duration_s);
+  place->second.first.Increment();
+  if (!exchange.stream) place->second.second.Observe(exchange.duration_s);
   sent_bytes_.Increment(static_cast<double>(exchange.response_bytes));
   received_bytes_.Increment(static_cast<double>(exchange.request_bytes));
 }

@@ -44,10 +44,7 @@ class HttpMetrics : public ServerObserver {
   void connections(std::size_t open) override { connections_ = open; }
 
  private:
-  struct Series {
-    prometheus::Counter* requests = nullptr;
-    prometheus::Histogram* duration = nullptr;
-  };
+  using Series = std::pair<prometheus::Counter&, prometheus::Histogram&>;  // requests, their durations
   Metrics& metrics_;
   std::map<std::pair<const char*, unsigned>, Series> series_;  // by operation and status; I/O thread only
   std::vector<prometheus::Counter*> refusals_;

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "base/text.h"
 
-// Small pieces of text work shared by the HTTP frame and the settings.
+// Text of the HTTP frame and the settings: words, lists, numbers, targets of requests.
 namespace joulecast::http {
 
 constexpr char lower(char c) {

@@ -133,11 +133,10 @@ void BatteryTopics::publish_all() {
 
 Result<void> BrokerOptions::set_url(const std::string& url) {
   tls = url.starts_with("mqtts://");
-  const auto parsed = tls || url.starts_with("mqtt://")
-                          ? http_client::parse_url("http" + url.substr(4), "mqtt.url")
-                          : invalid("mqtt.url", "");
-  if (!parsed || !parsed->base_path.empty())
-    return invalid("mqtt.url", "must be mqtt://host[:port] or mqtts://host[:port]");
+  const auto refusal = invalid("mqtt.url", "must be mqtt://host[:port] or mqtts://host[:port]");
+  if (!tls && !url.starts_with("mqtt://")) return refusal;
+  const auto parsed = http_client::parse_url("http" + url.substr(4), "mqtt.url");
+  if (!parsed || !parsed->base_path.empty()) return refusal;
   host = parsed->host;
   port = tls ? 8883 : 1883;
   // The port that an HTTP URL has when it states none.

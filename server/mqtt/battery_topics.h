@@ -46,8 +46,8 @@ class BrokerLink {
   // broker.
   Result<void> start(const std::string& last_topic, const std::string& last_words);
   bool is_connected() const { return connected_; }
-  // Fault::unavailable without a connection; the message is not queued. The broker acknowledges retained
-  // ones.
+  // Fault::unavailable without a connection; the message is not queued. Retained messages have quality of
+  // service 1, others 0.
   Result<void> publish(const std::string& topic, const std::string& message, bool retained);
   // Disconnects from the broker.
   void stop();

@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <stop_token>
 #include <utility>
 
 #include "answers/mission.h"
@@ -91,11 +93,10 @@ Result<Pricing> as_usual(const AutonomyInput& input, const TaskPlan& plan, const
 // Prices legs driven as the planner would: minimum energy from stop to stop, within the robot's limits. In
 // free time straight legs and turns come from the robot's cost table, which is made once for its model (some
 // tenths of a second) and kept; curves, all legs where a second has its price, and those of paths where the
-// floor has effects, are solved one by one, equal ones once.
+// floor has effects, are solved one by one, equal ones once. All end with an error when the token is set. Not
+// thread-safe.
 class LeastEnergy {
  public:
-  // All end with an error when the token is set. The planner's drives are followed by no halts but those
-  // among the legs. Error: a leg that cannot be driven within the limits.
   static Result<LeastEnergy> make(const ModelInForce& model, planning::CostTableCache& tables,
                                   double value_of_time_w, const std::stop_token& stop) {
     LeastEnergy least(model, value_of_time_w, stop);
@@ -104,6 +105,8 @@ class LeastEnergy {
     }
     return least;
   }
+  // The planner's drives are followed by no halts but those among the legs. Error: a leg that cannot be
+  // driven within the limits.
   Result<Pricing> price(const TaskPlan& plan) {
     Pricing priced;
     for (const TaskPlan::Task& task : plan.tasks) {

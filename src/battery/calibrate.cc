@@ -21,17 +21,20 @@ constexpr double slow_hours = 8;  // at least this long is an open-circuit test
 constexpr double voltage_error_share = 0.00135;
 constexpr double charge_error = 0.002;
 constexpr double least_temperature_span_k = 3;
-constexpr double flowing_share = 0.001;     // of the capacity in an hour: less current is rest
+constexpr double flowing_share = 0.001;  // of the greatest current or the capacity in an hour: less is rest
 constexpr double activation_unit_k = 1000;  // the fit's parameters are all of order one
 
 // ---- the slow discharge ----
 
-// More current than at rest, by what the recording discharges. Sensors have zeros of a few mA.
+// Current above which the battery is in use: by the greatest current, and by the charge that it holds, as the
+// zero of a current sensor is large relative to a slow discharge.
 double flowing_a(const Recording& recording) {
-  double discharged_ah = 0;
-  for (std::size_t row = 1; row < recording.size(); ++row)
-    discharged_ah += std::max(recording.current_a[row], 0.0) * recording.duration_s(row) / 3600;
-  return flowing_share * discharged_ah;
+  double charge_ah = 0, least_ah = 0, most_ah = 0;
+  for (std::size_t row = 1; row < recording.size(); ++row) {
+    charge_ah += recording.current_a[row] * recording.duration_s(row) / 3600;
+    least_ah = std::min(least_ah, charge_ah), most_ah = std::max(most_ah, charge_ah);
+  }
+  return flowing_share * std::max(std::ranges::max(recording.current_a), most_ah - least_ah);
 }
 
 // The first interval without charging; a test that was recharged in the same file ends there.

@@ -14,8 +14,8 @@
 
 namespace joulecast::planning {
 
-// A way between two stops, in this order: straight segments, turns in place, runs that a cost table does not
-// contain, and dwells. The task determines the payload.
+// A way between two stops, each segment from rest to rest, in this order: straight segments, turns in place,
+// runs that a cost table does not contain, and dwells. The task determines the payload.
 using Leg = std::vector<PlannedLeg>;
 Leg leg_of(const Path& path);
 

@@ -122,7 +122,7 @@ inline constexpr std::size_t motion_count = 3;
 // A segment of a planned task, from stop to stop.
 struct PlannedLeg {
   Motion motion = Motion::stand;
-  double way = 0;            // m, rad; 0 when standing
+  double way = 0;            // m, rad; >= 0, turns unsigned; 0 when standing
   double curvature_1_m = 0;  // >= 0
   double payload_kg = 0;
   double duration_s = 0;                     // when standing

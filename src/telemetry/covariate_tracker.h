@@ -41,7 +41,7 @@ class CovariateTracker {
     double value = signals::unmeasured;
   };
 
-  // A value older by more than this than the one that holds shows a clock set back, and is news.
+  // A value that is older than the current one by more than this shows a clock set back, and is news.
   static constexpr std::int64_t reorder_us = 5'000'000;
 
   std::int64_t mission_start_us_ = INT64_MIN;

@@ -183,8 +183,12 @@ std::vector<FieldFault> suspicious(const ImportMapping& mapping) {
   if (!both("battery_voltage", "battery_current") && !both("motor_voltage[0]", "motor_current[0]"))
     found.push_back(
         {"/fields",
-         "contains neither voltage and current of the battery nor those of the motors: power is unknown. A "
-         "voltage that was not recorded may be stated as \"battery_voltage\": {\"constant\": 48}"});
+         std::string("contains neither voltage and current of the battery nor those of the motors: power "
+                     "is unknown") +
+             (given.contains("battery_current")
+                  ? ". A voltage that was not recorded may be stated: \"battery_voltage\": "
+                    "{\"constant\": <volts>}"
+                  : "")});
   for (const auto& [name, expression] : given) {
     // A constant pitch is a statement: that a dynamometer is flat.
     if (expression->combine != Combine::constant || name == "pitch") continue;

@@ -26,7 +26,10 @@ Eigen::VectorXd ridge_deviations(const ChannelRows& rows, const Equations& e,
 
 double size_of(std::vector<double> residual, bool by_squares) {
   double squares = 0;
-  for (double& e : residual) squares += e * e, e = std::fabs(e);
+  for (double& e : residual) {
+    squares += e * e;
+    e = std::fabs(e);
+  }
   return by_squares ? std::sqrt(squares / static_cast<double>(residual.size()))
                     : 1.4826 * statistics::median(std::move(residual));
 }
@@ -46,7 +49,7 @@ Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual
   for (const auto& own : classes) {
     std::vector<double> values;
     for (const Eigen::Index k : own) values.push_back(residual[k]);
-    found.push_back(values.size() < fewest_of_class ? missing : size_of(values, by_squares));
+    found.push_back(values.size() < fewest_of_class ? missing : size_of(std::move(values), by_squares));
     if (std::isfinite(found.back())) most = std::max(most, found.back());
   }
   if (most == 0) most = all;

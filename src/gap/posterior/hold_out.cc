@@ -208,6 +208,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     for (std::size_t r = 0; r < n; ++r)
       if (fold_of(d.rows.window(r).block) == k) tested.push_back(ix(r));
     if (tested.empty()) continue;
+    // A step from the point of the walk, as far as the power of the other parts improves.
     const Eigen::VectorXd power_w = damped_step(fit, p.effects.head(ix(e.effects)), weights).power_w;
     out.explained_w(tested) = power_w(tested);
     const double few = static_cast<double>(d.fewest);

@@ -142,8 +142,8 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
     last_set = set;
     last = now;
     const Eigen::VectorXd target = joined(*fit, now);
-    // Only power at the battery tells how far a step leads.
-    if (!fit->data.power || !fit->data.rows.meter.empty()) {
+    // Where only the motors' power is measured, their own rows contain it already.
+    if (!fit->data.power || (fit->data.motors && !fit->data.rows.meter.empty())) {
       point = target;
       continue;
     }

@@ -6,8 +6,8 @@
 // The answer of the posterior as a diagnosis, for recordings, tables of runs and groups.
 namespace joulecast::gap {
 
-// Sets verdict, effects and outside: with the verdict effects only named effects, with the verdict none none.
-// `mean_power_w` is NaN where no power is known.
+// Sets verdict, effects and outside. All listed effects are reported, for Verdict::effects only the named
+// ones, for Verdict::none none. `mean_power_w` is NaN where no power is known.
 void state_effects(const posterior::Explained& answer, double mean_power_w, Diagnosis& diagnosis);
 
 // Sets the errors of the baseline, their deviation over blocks and, where effects are reported, the

@@ -288,10 +288,13 @@ TEST(NoisySpeed, MassIsNotAttenuated) {
 // payload and an inertia in place of the grade predicts power worse than the file does.
 TEST(NoisySpeed, GradeIsNoPayload) {
   Drives drives(36);
-  const dynamics::DriveModel model(drives.robot, std::vector{effect_of("grade", 1)});
+  drives.robot.effects.push_back({"turning_scrub", {{"coefficient", 0.03}, {"rate_rad_s", 0.05}}});
+  auto effects = *dynamics::active_effects(drives.robot);
+  effects.push_back(effect_of("grade", 1));
+  const dynamics::DriveModel model(drives.robot, effects);
   telemetry::RecordingSet recordings = drives.recordings();
   std::mt19937_64 random(36);
-  std::normal_distribution<double> noise(0, 0.02);
+  std::normal_distribution<double> noise(0, 0.03);
   for (telemetry::Recording& mission : recordings.missions) {
     for (signals::Sample& s : mission.samples) {
       const double t = 1e-6 * static_cast<double>(s.utime_us % 1'000'000'000);
@@ -307,7 +310,7 @@ TEST(NoisySpeed, GradeIsNoPayload) {
       const auto flow = model.flow(at);
       s.motor_current_a = flow.current_a;
       for (const std::size_t k : {0u, 1u}) s.motor_voltage_v[k] = model.voltage_for(k, flow.current_a[k], at);
-      s.battery_current_a = (flow.battery_power_w + 50 * noise(random)) / s.battery_voltage_v;
+      s.battery_current_a = (flow.battery_power_w + 30 * noise(random)) / s.battery_voltage_v;
     }
   }
   const auto fit = fit_missions(recordings.missions, drives.robot);
