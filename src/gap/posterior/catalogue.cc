@@ -174,10 +174,9 @@ void bound(const Data& d, Hypothesis& h) {
   h.most = info.parameters[h.parameter].maximum - own;
 }
 
-// Discs of the floor, at most three, in which the residual of power is largest beyond a constant, friction
+// Discs of the floor, at most `most`, in which the residual of power is largest beyond a constant, friction
 // and speed.
-std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w) {
-  constexpr std::size_t most = 3;
+std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, std::size_t most) {
   constexpr std::size_t side = 9;
   constexpr std::array radii{0.15, 0.22, 0.3};  // of the floor's extent
   constexpr std::size_t fewest = 20;
@@ -261,7 +260,8 @@ Catalogue make_catalogue(const Data& d) {
   const std::span<const Window> seen = d.at_readings() ? d.rows.instants : d.windows;
   const Motion motion = motion_of(seen);
   std::vector<Zone> zones;
-  if (motion.position && d.power) zones = find_zones(d, d.rows.measured_w() - predicted_power(d, d.in_file));
+  if (motion.position && d.power)
+    zones = find_zones(d, d.rows.measured_w() - predicted_power(d, d.in_file), 3);
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
     const std::string_view id = effect->info().id;
     if (!shown(d, id) || (!motion.turning && contains(need_turns, id))) continue;
