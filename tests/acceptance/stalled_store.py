@@ -173,6 +173,7 @@ def taken_away(programs, options, how):
     """The database file is deleted, replaced or made read-only under the idle daemon."""
     model = json.load(open(os.path.join(options.source, "deploy/robots/amr.json")))
     programs.start()
+    wait_until(lambda: status_of(programs, "/readyz")[0] == 200, 10.0, "readyz after the start")
     if how == "deleted":
         for suffix in ("", "-wal", "-shm"):
             os.remove(programs.store + suffix)
