@@ -9,7 +9,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <stop_token>
 #include <utility>
 
 #include "answers/mission.h"
@@ -277,18 +276,15 @@ struct AutonomyContext : PathContext {
   bool placed = true;  // the next task begins at a known place
 };
 
-const Input<StatedPace>& pace_input() {
-  static const auto input =
-      Input<StatedPace>()
-          .number("speed_m_s", &StatedPace::speed_m_s, positive,
-                  "stated cruise speed; if ramps are stated too, the forecast contains no halts after drives")
-          .number("acceleration_m_s2", &StatedPace::acceleration_m_s2, positive,
-                  "acceleration of ramps in drives")
-          .number("yaw_rate_rad_s", &StatedPace::yaw_rate_rad_s, positive, "cruise rate of turns in place")
-          .number("yaw_acceleration_rad_s2", &StatedPace::yaw_acceleration_rad_s2, positive,
-                  "acceleration of ramps in turns in place");
-  return input;
-}
+const auto pace_input =
+    Input<StatedPace>()
+        .number("speed_m_s", &StatedPace::speed_m_s, positive,
+                "stated cruise speed; if ramps are stated too, the forecast contains no halts after drives")
+        .number("acceleration_m_s2", &StatedPace::acceleration_m_s2, positive,
+                "acceleration of ramps in drives")
+        .number("yaw_rate_rad_s", &StatedPace::yaw_rate_rad_s, positive, "cruise rate of turns in place")
+        .number("yaw_acceleration_rad_s2", &StatedPace::yaw_acceleration_rad_s2, positive,
+                "acceleration of ramps in turns in place");
 
 void take_common_pace(Fields&, AutonomyTask& task, AutonomyContext& context) {
   for (const auto member : {&StatedPace::speed_m_s, &StatedPace::acceleration_m_s2,
@@ -320,113 +316,102 @@ void check_something_to_do(Fields& fields, AutonomyTask&, AutonomyContext&) {
                                      fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", ")));
 }
 
-const Input<AutonomyTask, AutonomyContext>& task_input() {
-  using Part = Input<AutonomyTask, AutonomyContext>;
-  static const auto input =
-      Part("A task of a list",
-           "drive, then dwell; each task begins where the one before ended; a path, or distances and turns, "
-           "or a pick-up and a drop-off, or dwell_s alone")
-          .named("task")
-          .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
-          .number("payload_kg", &AutonomyTask::payload_kg, payload_kg_bounds,
-                  "carried from here on, absent: as before; with pickup, from there to dropoff, absent: none")
-          .include(pace_input(), &AutonomyTask::pace)
-          .check(take_common_pace)
-          .include(way_input(), &AutonomyTask::way)
-          .include(former_way_input(), &AutonomyTask::way)
-          .check(check_place)
-          .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
-                  "time at rest at the end of the task. If any task states it, 0 included, the forecast "
-                  "contains no other halts")
-          .number(
-              "to_charger_m", &AutonomyTask::to_charger_m, charger_way_m,
-              "distance from this task's end to the charger; required where the charger's position is not "
-              "given, and from a task on that states distances without turns, which ends at no known place")
-          .check(check_charger)
-          .finally(check_something_to_do);
-  return input;
-}
+const auto task_input =
+    Input<AutonomyTask, AutonomyContext>(
+        "A task of a list",
+        "drive, then dwell; each task begins where the one before ended; a path, or distances and turns, "
+        "or a pick-up and a drop-off, or dwell_s alone")
+        .named("task")
+        .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
+        .number("payload_kg", &AutonomyTask::payload_kg, payload_kg_bounds,
+                "carried from here on, absent: as before; with pickup, from there to dropoff, absent: none")
+        .include(pace_input, &AutonomyTask::pace)
+        .check(take_common_pace)
+        .include(way_input(), &AutonomyTask::way)
+        .include(former_way_input(), &AutonomyTask::way)
+        .check(check_place)
+        .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
+                "time at rest at the end of the task. If any task states it, 0 included, the forecast "
+                "contains no other halts")
+        .number("to_charger_m", &AutonomyTask::to_charger_m, charger_way_m,
+                "distance from this task's end to the charger; required where the charger's position is not "
+                "given, and from a task on that states distances without turns, which ends at no known place")
+        .check(check_charger)
+        .finally(check_something_to_do);
 
-const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
-  static const auto charger =
-      Input<Charger>()
-          .include(point_input<planning::Point>("place of the charger on the map"), &Charger::at)
-          .number("detour_factor", &Charger::detour_factor, {.minimum = 1, .maximum = 100},
-                  "of the way to it over the straight line", 1);
-  static const auto input =
-      Input<AutonomyRequest, AutonomyContext>(
-          "Conditions of an autonomy forecast; with an empty object, those of the robot at present")
-          .named("autonomy-request")
-          .number("state_of_charge", AT(input.state_of_charge), fraction,
-                  "state of charge; default: the live one")
-          .number("state_of_charge_sd", AT(input.state_of_charge_sd), {.minimum = 0, .maximum = 0.5},
-                  "standard deviation of state_of_charge")
-          .number("reserve_fraction", AT(input.reserve_fraction), fraction,
-                  "charge to be left at the end; default: that of the robot file")
-          .number("payload_kg", AT(input.payload_kg), payload_kg_bounds,
-                  "present payload; default: the live one, else 0")
-          .choice("driving", AT(input.driving), driving_names,
-                  "driving model. usual: at the robot's own pace or the stated one, which predicts how long "
-                  "the charge lasts in operation; minimum_energy: along the planner's profiles",
-                  static_cast<std::size_t>(Driving::usual))
-          .boolean(
-              "compare_minimum_energy",
-              [](AutonomyRequest& request, std::optional<bool> given) {
-                bool& compare = request.input.compare_minimum_energy;
-                compare = given.value_or(compare) && request.input.driving == Driving::usual;
-              },
-              "report what minimum-energy profiles would change; default true for one robot, false for a "
-              "fleet")
-          .boolean("compare_fastest", AT(input.compare_fastest),
-                   "report the fastest minimum-energy profiles with which the plan ends with the reserve at "
-                   "the probability confidence",
-                   false)
-          .number("value_of_time_w", AT(input.value_of_time_w), value_of_time_bounds_w,
-                  "value of time in minimum-energy profiles, W; the time_multiplier_w of a profile's "
-                  "certificate, with or without a deadline, reproduces that profile",
-                  0)
-          .include(pace_input(), AT(input.pace))
-          .number("confidence", AT(input.confidence), {.minimum = 0.01, .maximum = 0.999},
-                  "probability for the latest departure", 0.95)
-          .choice("dialect", &AutonomyRequest::dialect, dialect_names,
-                  "format of the response: that of this service or a battery message of another standard",
-                  static_cast<std::size_t>(Dialect::joulecast))
-          .object("start_pose", AT(input.start_pose),
-                  "start of the tasks; default: the robot's position, else the origin", pose_input())
-          .object("charger", AT(input.charger),
-                  "charger at which the plan ends: reached by a turn and a straight line, its length times "
-                  "detour_factor",
-                  charger)
-          .number("to_charger_m", AT(input.to_charger_m), charger_way_m,
-                  "distance from the start to the charger, if its position is not given")
-          .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
-            context.input = &request.input;
-          })
-          .list("tasks", AT(input.tasks), tasks_of_autonomy,
-                "tasks in the order of execution; null or absent: no task forecast", task_input(),
-                described::Presence::optional);
-  return input;
-}
+const auto charger_input =
+    Input<Charger>()
+        .include(point_input<planning::Point>("place of the charger on the map"), &Charger::at)
+        .number("detour_factor", &Charger::detour_factor, {.minimum = 1, .maximum = 100},
+                "of the way to it over the straight line", 1);
+const auto autonomy_input =
+    Input<AutonomyRequest, AutonomyContext>(
+        "Conditions of an autonomy forecast; with an empty object, those of the robot at present")
+        .named("autonomy-request")
+        .number("state_of_charge", AT(input.state_of_charge), fraction,
+                "state of charge; default: the live one")
+        .number("state_of_charge_sd", AT(input.state_of_charge_sd), {.minimum = 0, .maximum = 0.5},
+                "standard deviation of state_of_charge")
+        .number("reserve_fraction", AT(input.reserve_fraction), fraction,
+                "charge to be left at the end; default: that of the robot file")
+        .number("payload_kg", AT(input.payload_kg), payload_kg_bounds,
+                "present payload; default: the live one, else 0")
+        .choice("driving", AT(input.driving), driving_names,
+                "driving model. usual: at the robot's own pace or the stated one, which predicts how long "
+                "the charge lasts in operation; minimum_energy: along the planner's profiles",
+                static_cast<std::size_t>(Driving::usual))
+        .boolean(
+            "compare_minimum_energy",
+            [](AutonomyRequest& request, std::optional<bool> given) {
+              bool& compare = request.input.compare_minimum_energy;
+              compare = given.value_or(compare) && request.input.driving == Driving::usual;
+            },
+            "report what minimum-energy profiles would change; default true for one robot, false for a "
+            "fleet")
+        .boolean("compare_fastest", AT(input.compare_fastest),
+                 "report the fastest minimum-energy profiles with which the plan ends with the reserve at "
+                 "the probability confidence",
+                 false)
+        .number("value_of_time_w", AT(input.value_of_time_w), value_of_time_bounds_w,
+                "value of time in minimum-energy profiles, W; the time_multiplier_w of a profile's "
+                "certificate, with or without a deadline, reproduces that profile",
+                0)
+        .include(pace_input, AT(input.pace))
+        .number("confidence", AT(input.confidence), {.minimum = 0.01, .maximum = 0.999},
+                "probability for the latest departure", 0.95)
+        .choice("dialect", &AutonomyRequest::dialect, dialect_names,
+                "format of the response: that of this service or a battery message of another standard",
+                static_cast<std::size_t>(Dialect::joulecast))
+        .object("start_pose", AT(input.start_pose),
+                "start of the tasks; default: the robot's position, else the origin", pose_input())
+        .object("charger", AT(input.charger),
+                "charger at which the plan ends: reached by a turn and a straight line, its length times "
+                "detour_factor",
+                charger_input)
+        .number("to_charger_m", AT(input.to_charger_m), charger_way_m,
+                "distance from the start to the charger, if its position is not given")
+        .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
+          context.input = &request.input;
+        })
+        .list("tasks", AT(input.tasks), tasks_of_autonomy,
+              "tasks in the order of execution; null or absent: no task forecast", task_input,
+              described::Presence::optional);
 
 using described::Table;
 using forecast::Outlook;
 using forecast::TaskOutlook;
 
-const Table<TaskOutlook>& stage_table() {
-  using S = TaskOutlook;
-  static const auto table =
-      Table<S>()
-          .number_or_null("expected_energy_j", &S::mean_j,
-                          "mean energy of this leg; the legs add up to the whole")
-          .number_or_null("ends_after_s", &S::duration_s, "expected time from now to its end")
-          .number_or_null("success_probability", &S::probability,
-                          "probability that the reserve is not used until its end")
-          .object("energy_since_start_j", &S::energy_j, "energy from now at the quantiles 5, 50 and 95 %",
-                  quantiles_table())
-          .object("arrival_charge", &S::charge, "charge when it ends at the quantiles 5, 50 and 95 %",
-                  quantiles_table());
-  return table;
-}
+const auto stage_table =
+    Table<TaskOutlook>()
+        .number_or_null("expected_energy_j", AT(mean_j),
+                        "mean energy of this leg; the legs add up to the whole")
+        .number_or_null("ends_after_s", AT(duration_s), "expected time from now to its end")
+        .number_or_null("success_probability", AT(probability),
+                        "probability that the reserve is not used until its end")
+        .object("energy_since_start_j", AT(energy_j), "energy from now at the quantiles 5, 50 and 95 %",
+                quantiles_table())
+        .object("arrival_charge", AT(charge), "charge when it ends at the quantiles 5, 50 and 95 %",
+                quantiles_table());
 
 struct PlannedTask {
   const TaskOutlook& stage;
@@ -470,50 +455,46 @@ std::optional<LatestDeparture> latest_departure(const PlanAnswer& plan) {
   return LatestDeparture{*plan.outlook.latest_departure, plan.input.confidence};
 }
 
-const Table<PlanAnswer>& plan_table() {
-  static const auto departure =
-      Table<LatestDeparture>()
-          .value("after_tasks", AT(leave.after_tasks),
-                 "number of tasks before the departure; 0: immediate departure")
-          .number_or_null("at_s", AT(leave.at_s), "expected time from now when they are done")
-          .number_or_null("wait_s", AT(leave.wait_s), "permitted waiting time there")
-          .number_or_null(
-              "latest_s", [](const LatestDeparture& d) { return d.leave.at_s + d.leave.wait_s; },
-              "at_s + wait_s")
-          .number_or_null("probability", AT(leave.probability),
-                          "probability of reaching the charger with the reserve when leaving at at_s")
-          .number_or_null("confidence", &LatestDeparture::confidence, "as requested");
-  static const auto leg = Table<PlannedTask>()
-                              .value("task_id", AT(task_id), "the caller's name of the task")
-                              .include(stage_table(), AT(stage));
-  static const auto task = Table<Place>()
-                               .value("task", &Place::task, "index into tasks; null: the way to the charger")
-                               .value("task_id", &Place::task_id, "null: the way to the charger");
-  using P = PlanAnswer;
-  static const auto table =
-      Table<P>()
-          .number_or_null("success_probability", AT(outlook.probability),
-                          "probability of finishing all tasks and reaching the charger with the reserve")
-          .number_or_null("expected_energy_j", AT(outlook.mean_j), "mean total energy, the sum over the legs")
-          .number_or_null("duration_s", AT(outlook.duration_s[1]), "median")
-          .object("energy_j", AT(outlook.energy_j), "total energy at the quantiles 5, 50 and 95 %",
-                  quantiles_table())
-          .object(
-              "duration_quantiles_s", AT(outlook.duration_s),
-              "total duration at the quantiles 5, 50 and 95 %; all equal if the plan states the pace and all "
-              "dwells",
-              quantiles_table())
-          .list("legs", planned_tasks, "one per task", leg)
-          .object("charger", AT(outlook.charger), "the way to the charger after the last task", stage_table())
-          .object("fails_at", place(&Outlook::fails_at),
-                  "first task at which use of the reserve is more likely than not; null: none", task)
-          .object("likeliest_failure", place(&Outlook::likeliest_failure),
-                  "task at which use of the reserve most likely begins; null: none", task)
-          .object("latest_departure", latest_departure,
-                  "last moment to leave for the charger; null: no charger given, or too late already",
-                  departure);
-  return table;
-}
+const auto departure_table =
+    Table<LatestDeparture>()
+        .value("after_tasks", AT(leave.after_tasks),
+               "number of tasks before the departure; 0: immediate departure")
+        .number_or_null("at_s", AT(leave.at_s), "expected time from now when they are done")
+        .number_or_null("wait_s", AT(leave.wait_s), "permitted waiting time there")
+        .number_or_null(
+            "latest_s", [](const LatestDeparture& d) { return d.leave.at_s + d.leave.wait_s; },
+            "at_s + wait_s")
+        .number_or_null("probability", AT(leave.probability),
+                        "probability of reaching the charger with the reserve when leaving at at_s")
+        .number_or_null("confidence", AT(confidence), "as requested");
+const auto leg_table = Table<PlannedTask>()
+                           .value("task_id", AT(task_id), "the caller's name of the task")
+                           .include(stage_table, AT(stage));
+const auto place_table = Table<Place>()
+                             .value("task", AT(task), "index into tasks; null: the way to the charger")
+                             .value("task_id", AT(task_id), "null: the way to the charger");
+const auto plan_table =
+    Table<PlanAnswer>()
+        .number_or_null("success_probability", AT(outlook.probability),
+                        "probability of finishing all tasks and reaching the charger with the reserve")
+        .number_or_null("expected_energy_j", AT(outlook.mean_j), "mean total energy, the sum over the legs")
+        .number_or_null("duration_s", AT(outlook.duration_s[1]), "median")
+        .object("energy_j", AT(outlook.energy_j), "total energy at the quantiles 5, 50 and 95 %",
+                quantiles_table())
+        .object(
+            "duration_quantiles_s", AT(outlook.duration_s),
+            "total duration at the quantiles 5, 50 and 95 %; all equal if the plan states the pace and all "
+            "dwells",
+            quantiles_table())
+        .list("legs", planned_tasks, "one per task", leg_table)
+        .object("charger", AT(outlook.charger), "the way to the charger after the last task", stage_table)
+        .object("fails_at", place(&Outlook::fails_at),
+                "first task at which use of the reserve is more likely than not; null: none", place_table)
+        .object("likeliest_failure", place(&Outlook::likeliest_failure),
+                "task at which use of the reserve most likely begins; null: none", place_table)
+        .object("latest_departure", latest_departure,
+                "last moment to leave for the charger; null: no charger given, or too late already",
+                departure_table);
 
 Quantiles charge_at_end(const Outlook& outlook) {
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
@@ -522,16 +503,13 @@ Quantiles charge_at_end(const Outlook& outlook) {
                                  : outlook.tasks.back().charge;
 }
 
-const Table<Outlook>& end_table() {
-  static const auto table =
-      Table<Outlook>()
-          .number_or_null("success_probability", &Outlook::probability, "probability that the charge lasts")
-          .number_or_null("expected_energy_j", &Outlook::mean_j, "mean energy, the sum over the legs")
-          .number_or_null("duration_s", AT(duration_s[1]), "of the tasks")
-          .object("arrival_charge", charge_at_end, "charge at the end at the quantiles 5, 50 and 95 %",
-                  quantiles_table());
-  return table;
-}
+const auto end_table =
+    Table<Outlook>()
+        .number_or_null("success_probability", AT(probability), "probability that the charge lasts")
+        .number_or_null("expected_energy_j", AT(mean_j), "mean energy, the sum over the legs")
+        .number_or_null("duration_s", AT(duration_s[1]), "of the tasks")
+        .object("arrival_charge", charge_at_end, "charge at the end at the quantiles 5, 50 and 95 %",
+                quantiles_table());
 
 struct AutonomyAnswer {
   const AutonomyRequest& request;
@@ -567,55 +545,46 @@ std::string_view basis(const AutonomyAnswer& a) {
   return forecaster.missions > 0 ? "recent_missions" : forecaster.siblings > 0 ? "siblings" : "model";
 }
 
-const Table<AutonomyAnswer>& pace_table() {
-  using A = AutonomyAnswer;
-  static const auto table =
-      Table<A>()
-          .number_or_null("speed_m_s", AT(pace().speed_m_s), "forward speed; negative: backwards")
-          .number_or_null("acceleration_m_s2", AT(pace().acceleration_m_s2), "forward acceleration")
-          .number_or_null("yaw_rate_rad_s", AT(pace().yaw_rate_rad_s),
-                          "rate of turning, positive to the left")
-          .number_or_null("pause_s", AT(pace().pause_s),
-                          "mean time at rest after a leg, with 0 for legs without a halt")
-          .value(
-              "limitation",
-              [](const A& a) {
-                return a.output.limitation ? std::optional(a.output.limitation->sentence) : std::nullopt;
-              },
-              "sentence present if the motors, within the robot's current limit and its battery's nominal "
-              "voltage, do not reach the pace; the other members then contain the pace that they reach, or "
-              "0, without range and plan, if they cannot move the robot");
-  return table;
-}
+const auto pace_table =
+    Table<AutonomyAnswer>()
+        .number_or_null("speed_m_s", AT(pace().speed_m_s), "forward speed; negative: backwards")
+        .number_or_null("acceleration_m_s2", AT(pace().acceleration_m_s2), "forward acceleration")
+        .number_or_null("yaw_rate_rad_s", AT(pace().yaw_rate_rad_s), "rate of turning, positive to the left")
+        .number_or_null("pause_s", AT(pace().pause_s),
+                        "mean time at rest after a leg, with 0 for legs without a halt")
+        .value(
+            "limitation",
+            [](const AutonomyAnswer& a) {
+              return a.output.limitation ? std::optional(a.output.limitation->sentence) : std::nullopt;
+            },
+            "sentence present if the motors, within the robot's current limit and its battery's nominal "
+            "voltage, do not reach the pace; the other members then contain the pace that they reach, or "
+            "0, without range and plan, if they cannot move the robot");
 
-const Table<AutonomyAnswer>& consumption_table() {
-  using A = AutonomyAnswer;
-  static const auto table =
-      Table<A>()
-          .word("basis", basis, std::array{"recent_missions", "siblings", "model"},
-                "data on which the forecast is based")
-          .value("missions", AT(forecaster().missions),
-                 "number of this robot's missions used for the forecast")
-          .value("siblings", AT(forecaster().siblings),
-                 "number of robots with equal body and motors used for the forecast")
-          .value("siblings_pending", AT(robot.siblings_pending),
-                 "the daemon has started and still reads missions of its siblings: the forecast will improve")
-          .number_or_null("energy_per_m_j", AT(output.reach.energy_per_m_j),
-                          "median consumption over the range: usable_energy_j / range_m")
-          .number_or_null("mean_power_w", AT(output.reach.mean_power_w),
-                          "median power over the run time: usable_energy_j / run_time_s")
-          .number_or_null(
-              "common_deviation", [](const A& a) { return a.track().inflation * a.track().common; },
-              "relative standard deviation that all legs of a mission share")
-          .number_or_null(
-              "leg_deviation",
-              [](const A& a) {
-                return a.track().inflation *
-                       a.track().scatter[static_cast<std::size_t>(forecast::Motion::drive)];
-              },
-              "relative standard deviation of each driven leg, independent of the other legs");
-  return table;
-}
+const auto consumption_table =
+    Table<AutonomyAnswer>()
+        .word("basis", basis, std::array{"recent_missions", "siblings", "model"},
+              "data on which the forecast is based")
+        .value("missions", AT(forecaster().missions), "number of this robot's missions used for the forecast")
+        .value("siblings", AT(forecaster().siblings),
+               "number of robots with equal body and motors used for the forecast")
+        .value("siblings_pending", AT(robot.siblings_pending),
+               "the daemon has started and still reads missions of its siblings: the forecast will improve")
+        .number_or_null("energy_per_m_j", AT(output.reach.energy_per_m_j),
+                        "median consumption over the range: usable_energy_j / range_m")
+        .number_or_null("mean_power_w", AT(output.reach.mean_power_w),
+                        "median power over the run time: usable_energy_j / run_time_s")
+        .number_or_null(
+            "common_deviation",
+            [](const AutonomyAnswer& a) { return a.track().inflation * a.track().common; },
+            "relative standard deviation that all legs of a mission share")
+        .number_or_null(
+            "leg_deviation",
+            [](const AutonomyAnswer& a) {
+              return a.track().inflation *
+                     a.track().scatter[static_cast<std::size_t>(forecast::Motion::drive)];
+            },
+            "relative standard deviation of each driven leg, independent of the other legs");
 
 // Under the model in force.
 std::optional<drift::Mark> drift_of(const AutonomyAnswer& a) {
@@ -634,85 +603,77 @@ std::optional<Comparison> minimum_energy(const AutonomyAnswer& a) {
   return Comparison{*a.output.minimum_energy_outlook, *a.output.outlook};
 }
 
-const Table<Comparison>& comparison_table() {
-  using C = Comparison;
-  static const auto table =
-      Table<C>()
-          .include(end_table(), AT(best))
-          .number_or_null(
-              "saved_j", [](const C& c) { return c.usual.mean_j - c.best.mean_j; },
-              "energy saved compared with usual driving")
-          .number_or_null(
-              "saved_s", [](const C& c) { return c.usual.duration_s[1] - c.best.duration_s[1]; },
-              "time saved; negative: longer duration");
-  return table;
-}
+const auto comparison_table =
+    Table<Comparison>()
+        .include(end_table, AT(best))
+        .number_or_null(
+            "saved_j", [](const Comparison& c) { return c.usual.mean_j - c.best.mean_j; },
+            "energy saved compared with usual driving")
+        .number_or_null(
+            "saved_s", [](const Comparison& c) { return c.usual.duration_s[1] - c.best.duration_s[1]; },
+            "time saved; negative: longer duration");
 
-const Table<AutonomyAnswer>& autonomy_table() {
-  using A = AutonomyAnswer;
-  static const auto fastest =
-      Table<FastestDriving>()
-          .value("value_of_time_w", &FastestDriving::value_of_time_w,
-                 "value of time with which profiles and estimates reproduce this driving")
-          .include(end_table(), &FastestDriving::outlook);
-  static const auto table =
-      Table<A>("Remaining range and run time of a robot")
-          .named("robot-autonomy")
-          .include(model_table(), [](const A& a) -> const ModelInForce& { return *a.robot.model; })
-          .value("state_of_charge", AT(output.charge.fraction), "state of charge of the forecast, 0 to 1")
-          .number_or_null("state_of_charge_sd", AT(output.charge.deviation),
-                          "standard deviation; 0 if not available")
-          .text_or_null(
-              "state_of_charge_limitation", [](const A& a) { return a.charging().charge_limitation; },
-              "why the standard deviation is large, as a sentence; null: no such reason, or the request "
-              "states the charge")
-          .value("reserve_fraction", AT(output.charge.reserve), "reserved share of the charge")
-          .word("charging", charging_phase, std::array{"constant_current", "taper", "full"},
-                "present charging phase; null: not charging, or the request states the charge")
-          .number_or_null(
-              "time_to_charged_s", [](const A& a) { return a.charging().to_full.duration_s; },
-              "time until the end of charging, if charging starts now; null: its charging current is "
-              "unknown, or the request states the charge")
-          .number_or_null(
-              "time_to_charged_sd_s", [](const A& a) { return a.charging().to_full.sd_s; },
-              "standard deviation of time_to_charged_s")
-          .number_or_null("usable_energy_j", AT(output.reach.usable_j),
-                          "energy at the terminals above the reserve and the cut-off voltage")
-          .number_or_null("usable_energy_sd_j", AT(output.reach.usable_deviation_j),
-                          "standard deviation of usable_energy_j")
-          .number_or_null("payload_kg", AT(output.payload_kg), "payload of the forecast")
-          .word("driving", driven, std::array{"usual", "stated", "minimum_energy"},
-                "stated: at the pace of the request")
-          .object("pace", std::identity(), "usual driving of the robot; null: not available", pace_table())
-          .object("consumption", std::identity(), "expected consumption", consumption_table())
-          .number_or_null("range_m", AT(output.reach.range_m[1]), "median")
-          .number_or_null("run_time_s", AT(output.reach.run_time_s[1]), "median")
-          .object("range_quantiles_m", AT(output.reach.range_m),
-                  "remaining range with driving as in its recent legs; at the quantiles 5, 50 and 95 %",
-                  quantiles_table())
-          .object("run_time_quantiles_s", AT(output.reach.run_time_s),
-                  "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
-          .object("drift", drift_of,
-                  "the last change of the robot under this model, as in its gap history; null: none",
-                  mark_table())
-          .object(
-              "plan",
-              [](const A& a) -> std::optional<PlanAnswer> {
-                if (!a.output.outlook) return std::nullopt;
-                return PlanAnswer{*a.output.outlook, a.request.input};
-              },
-              "null without tasks and charger", plan_table())
-          .object("minimum_energy", minimum_energy,
-                  "the same plan driven by minimum-energy profiles; null: not requested, or no such profile "
-                  "exists",
-                  comparison_table())
-          .object(
-              "fastest", AT(output.fastest),
-              "the plan driven as fast as the reserve allows with at least the requested confidence; null: "
-              "not requested, or even minimum-energy profiles do not keep it",
-              fastest);
-  return table;
-}
+const auto fastest_table =
+    Table<FastestDriving>()
+        .value("value_of_time_w", AT(value_of_time_w),
+               "value of time with which profiles and estimates reproduce this driving")
+        .include(end_table, AT(outlook));
+const auto autonomy_table =
+    Table<AutonomyAnswer>("Remaining range and run time of a robot")
+        .named("robot-autonomy")
+        .include(model_table(), [](const AutonomyAnswer& a) -> const ModelInForce& { return *a.robot.model; })
+        .value("state_of_charge", AT(output.charge.fraction), "state of charge of the forecast, 0 to 1")
+        .number_or_null("state_of_charge_sd", AT(output.charge.deviation),
+                        "standard deviation; 0 if not available")
+        .text_or_null(
+            "state_of_charge_limitation",
+            [](const AutonomyAnswer& a) { return a.charging().charge_limitation; },
+            "why the standard deviation is large, as a sentence; null: no such reason, or the request "
+            "states the charge")
+        .value("reserve_fraction", AT(output.charge.reserve), "reserved share of the charge")
+        .word("charging", charging_phase, std::array{"constant_current", "taper", "full"},
+              "present charging phase; null: not charging, or the request states the charge")
+        .number_or_null(
+            "time_to_charged_s", [](const AutonomyAnswer& a) { return a.charging().to_full.duration_s; },
+            "time until the end of charging, if charging starts now; null: its charging current is "
+            "unknown, or the request states the charge")
+        .number_or_null(
+            "time_to_charged_sd_s", [](const AutonomyAnswer& a) { return a.charging().to_full.sd_s; },
+            "standard deviation of time_to_charged_s")
+        .number_or_null("usable_energy_j", AT(output.reach.usable_j),
+                        "energy at the terminals above the reserve and the cut-off voltage")
+        .number_or_null("usable_energy_sd_j", AT(output.reach.usable_deviation_j),
+                        "standard deviation of usable_energy_j")
+        .number_or_null("payload_kg", AT(output.payload_kg), "payload of the forecast")
+        .word("driving", driven, std::array{"usual", "stated", "minimum_energy"},
+              "stated: at the pace of the request")
+        .object("pace", std::identity(), "usual driving of the robot; null: not available", pace_table)
+        .object("consumption", std::identity(), "expected consumption", consumption_table)
+        .number_or_null("range_m", AT(output.reach.range_m[1]), "median")
+        .number_or_null("run_time_s", AT(output.reach.run_time_s[1]), "median")
+        .object("range_quantiles_m", AT(output.reach.range_m),
+                "remaining range with driving as in its recent legs; at the quantiles 5, 50 and 95 %",
+                quantiles_table())
+        .object("run_time_quantiles_s", AT(output.reach.run_time_s),
+                "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
+        .object("drift", drift_of,
+                "the last change of the robot under this model, as in its gap history; null: none",
+                mark_table())
+        .object(
+            "plan",
+            [](const AutonomyAnswer& a) -> std::optional<PlanAnswer> {
+              if (!a.output.outlook) return std::nullopt;
+              return PlanAnswer{*a.output.outlook, a.request.input};
+            },
+            "null without tasks and charger", plan_table)
+        .object("minimum_energy", minimum_energy,
+                "the same plan driven by minimum-energy profiles; null: not requested, or no such profile "
+                "exists",
+                comparison_table)
+        .object("fastest", AT(output.fastest),
+                "the plan driven as fast as the reserve allows with at least the requested confidence; null: "
+                "not requested, or even minimum-energy profiles do not keep it",
+                fastest_table);
 
 }  // namespace
 
@@ -829,16 +790,16 @@ bool AutonomyRequest::former() const {
 }
 
 described::Schemas autonomy_schemas() {
-  described::Schema task = task_input().schema();
+  described::Schema task = task_input.schema();
   for (const std::string_view name : what_to_do) task["anyOf"].push_back({{"required", {name}}});
   const described::Schema any{
       {"title", "Remaining range and run time of a robot, and feasibility of a list of tasks"},
-      {"anyOf", {autonomy_table().of_member(), described::of_reference("battery-status")}}};
-  return {{"autonomy-request", autonomy_input().schema()},
+      {"anyOf", {autonomy_table.of_member(), described::of_reference("battery-status")}}};
+  return {{"autonomy-request", autonomy_input.schema()},
           {"task", std::move(task)},
           {"autonomy", any},
           {"battery-status", battery_status_schema()},
-          {"robot-autonomy", autonomy_table().schema()}};
+          {"robot-autonomy", autonomy_table.schema()}};
 }
 
 Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, const std::string& at) {
@@ -847,7 +808,7 @@ Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, c
   AutonomyContext context;
   context.payload_limit_kg = payload_kg_bounds.maximum;
   context.may_stand = true;
-  return autonomy_input().read(body, std::move(request), context, at);
+  return autonomy_input.read(body, std::move(request), context, at);
 }
 
 std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& a, const RobotOutlook& robot,
@@ -855,7 +816,7 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
   if (request.dialect != Dialect::joulecast)
     return battery_dialect(
         request.dialect, battery_status(robot.model->robot.battery, *robot.battery, a.charge, a.reach, now));
-  return autonomy_table().text({request, a, robot, now});
+  return autonomy_table.text({request, a, robot, now});
 }
 
 Result<std::string> autonomy_text(const AutonomyRequest& request, const RobotOutlook& robot,

@@ -69,92 +69,83 @@ int ros_status(const BatteryStatus& s) {
   return s.current_a > 0 ? ros_discharging : ros_not_charging;
 }
 
-const Table<BatteryStatus>& vda5050_3_0_table() {
-  static const auto supply = Table<BatteryStatus>()
-                                 .value("stateOfCharge", charge_percent, "percent", percentage)
-                                 .known("batteryVoltage", voltage_v, "V")
-                                 .known("batteryCurrent", charging_current_a, "A, negative while discharging")
-                                 .known("batteryHealth", health_percent, "percent", percentage)
-                                 .value("charging", &BatteryStatus::charging, "whether it charges")
-                                 .known(
-                                     "range", [](const BatteryStatus& s) { return promised(s.range_m, 0); },
-                                     range_words, at_least_0);
-  static const auto table =
-      Table<BatteryStatus>({}, "VDA 5050 3.0").object("powerSupply", std::identity(), "VDA 5050 3.0", supply);
-  return table;
-}
+const auto supply_table =
+    Table<BatteryStatus>()
+        .value("stateOfCharge", charge_percent, "percent", percentage)
+        .known("batteryVoltage", voltage_v, "V")
+        .known("batteryCurrent", charging_current_a, "A, negative while discharging")
+        .known("batteryHealth", health_percent, "percent", percentage)
+        .value("charging", AT(charging), "whether it charges")
+        .known(
+            "range", [](const BatteryStatus& s) { return promised(s.range_m, 0); }, range_words, at_least_0);
+const auto vda5050_3_0_table = Table<BatteryStatus>({}, "VDA 5050 3.0")
+                                   .object("powerSupply", std::identity(), "VDA 5050 3.0", supply_table);
 
-const Table<BatteryStatus>& vda5050_2_1_table() {
-  static const auto state =
-      Table<BatteryStatus>()
-          .value("batteryCharge", charge_percent, "percent", percentage)
-          .known("batteryVoltage", voltage_v, "V")
-          .value(
-              "batteryHealth",
-              [](const BatteryStatus& s) { return static_cast<std::int64_t>(std::floor(percent(s.health))); },
-              "percent", percentage)
-          .only([](const BatteryStatus& s) { return std::isfinite(s.health); })
-          .value("charging", &BatteryStatus::charging, "whether it charges")
-          .value(
-              "reach",
-              [](const BatteryStatus& s) {
-                return static_cast<std::int64_t>(promised(std::min(s.range_m, longest_reach_m), 0));
-              },
-              range_words, at_least_0)
-          .only([](const BatteryStatus& s) { return std::isfinite(s.range_m); });
-  static const auto table =
-      Table<BatteryStatus>({}, "VDA 5050 2.1").object("batteryState", std::identity(), "VDA 5050 2.1", state);
-  return table;
-}
+const auto battery_state_table =
+    Table<BatteryStatus>()
+        .value("batteryCharge", charge_percent, "percent", percentage)
+        .known("batteryVoltage", voltage_v, "V")
+        .value(
+            "batteryHealth",
+            [](const BatteryStatus& s) { return static_cast<std::int64_t>(std::floor(percent(s.health))); },
+            "percent", percentage)
+        .only([](const BatteryStatus& s) { return std::isfinite(s.health); })
+        .value("charging", AT(charging), "whether it charges")
+        .value(
+            "reach",
+            [](const BatteryStatus& s) {
+              return static_cast<std::int64_t>(promised(std::min(s.range_m, longest_reach_m), 0));
+            },
+            range_words, at_least_0)
+        .only([](const BatteryStatus& s) { return std::isfinite(s.range_m); });
+const auto vda5050_2_1_table =
+    Table<BatteryStatus>({}, "VDA 5050 2.1")
+        .object("batteryState", std::identity(), "VDA 5050 2.1", battery_state_table);
 
-const Table<BatteryStatus>& massrobotics_table() {
-  static const auto table =
-      Table<BatteryStatus>({}, "MassRobotics status report")
-          .value("batteryPercentage", charge_percent, "percent", percentage)
-          .known(
-              "remainingRunTime", [](const BatteryStatus& s) { return promised(s.run_time_s / 3600, milli); },
-              "hours; exceeded in 19 of 20 cases", at_least_0);
-  return table;
-}
+const auto massrobotics_table =
+    Table<BatteryStatus>({}, "MassRobotics status report")
+        .value("batteryPercentage", charge_percent, "percent", percentage)
+        .known(
+            "remainingRunTime", [](const BatteryStatus& s) { return promised(s.run_time_s / 3600, milli); },
+            "hours; exceeded in 19 of 20 cases", at_least_0);
 
-const Table<BatteryStatus>& ros_table() {
-  const auto none = [](const BatteryStatus&) { return std::vector<double>(); };
-  const auto empty = [](const BatteryStatus&) { return ""; };
-  static const auto table =
-      Table<BatteryStatus>({}, "ROS sensor_msgs/BatteryState, with null in place of NaN")
-          .number_or_null("voltage", voltage_v, "V")
-          .number_or_null(
-              "temperature", [](const BatteryStatus&) { return std::nan(""); }, "degrees Celsius")
-          .number_or_null("current", charging_current_a, "A, negative while discharging")
-          .number_or_null(
-              "charge", [](const BatteryStatus& s) { return rounded(s.charge * capacity_ah(s), milli); },
-              "Ah")
-          .number_or_null(
-              "capacity", [](const BatteryStatus& s) { return rounded(capacity_ah(s), milli); },
-              "Ah, present")
-          .number_or_null("design_capacity", &BatteryStatus::rated_capacity_ah, "Ah, rated")
-          .number_or_null("percentage", [](const BatteryStatus& s) { return rounded(s.charge, 4); }, "0 to 1",
-                          {{"minimum", 0}, {"maximum", 1}})
-          .value("power_supply_status", ros_status,
-                 "sensor_msgs/BatteryState: 0 unknown, 1 charging, 2 discharging, 3 not charging, 4 full",
-                 {{"minimum", 0}, {"maximum", 4}})
-          .value("power_supply_health",
-                 [](const BatteryStatus& s) {
-                   return std::isfinite(s.health) && s.health >= good_health ? ros_health_good
-                                                                             : ros_health_unknown;
-                 },
-                 "sensor_msgs/BatteryState: 1 good, 0 unknown", {{"minimum", 0}, {"maximum", 8}})
-          .value("power_supply_technology", &BatteryStatus::ros_technology,
-                 "sensor_msgs/BatteryState: 0 unknown, 1 NiMH, 2 Li-ion, 3 LiPo, 4 LiFePO4, 5 NiCd, 6 LiMn",
-                 {{"minimum", 0}, {"maximum", 7}})
-          .value(
-              "present", [](const BatteryStatus&) { return true; }, "whether a battery is present")
-          .column("cell_voltage", none, "empty: no cell data", milli, true)
-          .column("cell_temperature", none, "empty: no cell data", milli, true)
-          .value("location", empty, "empty: not available")
-          .value("serial_number", empty, "empty: not available");
-  return table;
-}
+constexpr auto no_cells = [](const BatteryStatus&) { return std::vector<double>(); };
+constexpr auto no_text = [](const BatteryStatus&) { return ""; };
+const auto ros_table =
+    Table<BatteryStatus>({}, "ROS sensor_msgs/BatteryState, with null in place of NaN")
+        .number_or_null("voltage", voltage_v, "V")
+        .number_or_null(
+            "temperature", [](const BatteryStatus&) { return std::nan(""); }, "degrees Celsius")
+        .number_or_null("current", charging_current_a, "A, negative while discharging")
+        .number_or_null(
+            "charge", [](const BatteryStatus& s) { return rounded(s.charge * capacity_ah(s), milli); }, "Ah")
+        .number_or_null(
+            "capacity", [](const BatteryStatus& s) { return rounded(capacity_ah(s), milli); }, "Ah, present")
+        .number_or_null("design_capacity", AT(rated_capacity_ah), "Ah, rated")
+        .number_or_null("percentage", [](const BatteryStatus& s) { return rounded(s.charge, 4); }, "0 to 1",
+                        {{"minimum", 0}, {"maximum", 1}})
+        .value("power_supply_status", ros_status,
+               "sensor_msgs/BatteryState: 0 unknown, 1 charging, 2 discharging, 3 not charging, 4 full",
+               {{"minimum", 0}, {"maximum", 4}})
+        .value("power_supply_health",
+               [](const BatteryStatus& s) {
+                 return std::isfinite(s.health) && s.health >= good_health ? ros_health_good
+                                                                           : ros_health_unknown;
+               },
+               "sensor_msgs/BatteryState: 1 good, 0 unknown", {{"minimum", 0}, {"maximum", 8}})
+        .value("power_supply_technology", AT(ros_technology),
+               "sensor_msgs/BatteryState: 0 unknown, 1 NiMH, 2 Li-ion, 3 LiPo, 4 LiFePO4, 5 NiCd, 6 LiMn",
+               {{"minimum", 0}, {"maximum", 7}})
+        .value(
+            "present", [](const BatteryStatus&) { return true; }, "whether a battery is present")
+        .column("cell_voltage", no_cells, "empty: no cell data", milli, true)
+        .column("cell_temperature", no_cells, "empty: no cell data", milli, true)
+        .value("location", no_text, "empty: not available")
+        .value("serial_number", no_text, "empty: not available");
+
+// Of each Dialect but this service's own.
+constexpr const Table<BatteryStatus>* dialect_tables[] = {nullptr, &vda5050_3_0_table, &vda5050_2_1_table,
+                                                          &massrobotics_table, &ros_table};
 
 }  // namespace
 
@@ -190,26 +181,14 @@ BatteryStatus battery_status(const robot::Battery& battery, const forecast::Char
 
 described::Schema battery_status_schema() {
   Schema forms = Schema::array();
-  for (const Table<BatteryStatus>* table :
-       {&vda5050_3_0_table(), &vda5050_2_1_table(), &massrobotics_table(), &ros_table()})
-    forms.push_back(table->of_member());
+  for (const Table<BatteryStatus>* table : dialect_tables)
+    if (table != nullptr) forms.push_back(table->of_member());
   return {{"title", "Battery message of another standard"}, {"anyOf", std::move(forms)}};
 }
 
 std::string battery_dialect(Dialect dialect, const BatteryStatus& status) {
-  switch (dialect) {
-    case Dialect::joulecast:
-      break;
-    case Dialect::vda5050_3_0:
-      return vda5050_3_0_table().text(status);
-    case Dialect::vda5050_2_1:
-      return vda5050_2_1_table().text(status);
-    case Dialect::massrobotics:
-      return massrobotics_table().text(status);
-    case Dialect::ros:
-      return ros_table().text(status);
-  }
-  return "{}";
+  const Table<BatteryStatus>* table = dialect_tables[static_cast<std::size_t>(dialect)];
+  return table != nullptr ? table->text(status) : "{}";
 }
 
 }  // namespace joulecast::answers

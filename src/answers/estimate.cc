@@ -145,34 +145,32 @@ void check_length(Fields& fields, const char* name, std::size_t times,
   if (column) check_length(fields, name, times, column->size());
 }
 
-const Input<MotionColumns>& columns_input() {
-  constexpr described::Count points{2, 200'000};
-  constexpr Bounds speed{.minimum = -100, .maximum = 100};
-  using Columns = MotionColumns;
-  static const auto input =
-      Input<Columns>({}, "speeds are linear in between")
-          .numbers("time_s", &Columns::time_s, points, {.minimum = 0, .maximum = 1e7},
-                   "times, ascending; repeated where only the acceleration or the climb steps")
-          .numbers("speed_m_s", &Columns::speed_m_s, points, speed, "forward speed; negative: backwards")
-          .numbers("yaw_rate_rad_s", &Columns::yaw_rate_rad_s, points, speed,
-                   "rate of turning, positive to the left")
-          .check([](Fields& fields, Columns& columns, described::Nothing&) {
-            check_length(fields, "speed_m_s", columns.time_s.size(), columns.speed_m_s.size());
-            check_length(fields, "yaw_rate_rad_s", columns.time_s.size(), columns.yaw_rate_rad_s);
-          })
-          .numbers("climb_rad", &Columns::climb_rad, points, {.minimum = -0.785, .maximum = 0.785},
-                   "angle of the floor along the heading, nose up positive, linear in between; used if the "
-                   "robot's effects contain grade")
-          .numbers("height_m", &Columns::height_m, points, {.minimum = -1e5, .maximum = 1e5},
-                   "height above any fixed datum, linear between two points; replaces climb_rad")
-          .check([](Fields& fields, Columns& columns, described::Nothing&) {
-            if (columns.climb_rad && columns.height_m)
-              fields.fault("climb_rad", "must not be combined with height_m, from which it follows");
-            check_length(fields, "climb_rad", columns.time_s.size(), columns.climb_rad);
-            check_length(fields, "height_m", columns.time_s.size(), columns.height_m);
-          });
-  return input;
-}
+constexpr described::Count points_of_motion{2, 200'000};
+constexpr Bounds motion_speed{.minimum = -100, .maximum = 100};
+
+const auto columns_input =
+    Input<MotionColumns>({}, "speeds are linear in between")
+        .numbers("time_s", AT(time_s), points_of_motion, {.minimum = 0, .maximum = 1e7},
+                 "times, ascending; repeated where only the acceleration or the climb steps")
+        .numbers("speed_m_s", AT(speed_m_s), points_of_motion, motion_speed,
+                 "forward speed; negative: backwards")
+        .numbers("yaw_rate_rad_s", AT(yaw_rate_rad_s), points_of_motion, motion_speed,
+                 "rate of turning, positive to the left")
+        .check([](Fields& fields, MotionColumns& columns, described::Nothing&) {
+          check_length(fields, "speed_m_s", columns.time_s.size(), columns.speed_m_s.size());
+          check_length(fields, "yaw_rate_rad_s", columns.time_s.size(), columns.yaw_rate_rad_s);
+        })
+        .numbers("climb_rad", AT(climb_rad), points_of_motion, {.minimum = -0.785, .maximum = 0.785},
+                 "angle of the floor along the heading, nose up positive, linear in between; used if the "
+                 "robot's effects contain grade")
+        .numbers("height_m", AT(height_m), points_of_motion, {.minimum = -1e5, .maximum = 1e5},
+                 "height above any fixed datum, linear between two points; replaces climb_rad")
+        .check([](Fields& fields, MotionColumns& columns, described::Nothing&) {
+          if (columns.climb_rad && columns.height_m)
+            fields.fault("climb_rad", "must not be combined with height_m, from which it follows");
+          check_length(fields, "climb_rad", columns.time_s.size(), columns.climb_rad);
+          check_length(fields, "height_m", columns.time_s.size(), columns.height_m);
+        });
 
 std::vector<energy::MotionPoint> points_of(const MotionColumns& columns) {
   std::vector<energy::MotionPoint> points;
@@ -207,57 +205,53 @@ struct EstimateAnswer {
   const ModelInForce& model;
 };
 
-const Table<EstimateAnswer>& estimate_table() {
-  using planning::BrokenLimit;
-  static const auto broken =
-      Table<BrokenLimit>()
-          .word("limit", &BrokenLimit::limit,
-                std::array{"speed", "acceleration", "yaw_rate", "wheel_speed", "current", "voltage"},
-                "the exceeded limit")
-          .value("reached", &BrokenLimit::reached,
-                 "greatest value of the motion, in the limit's unit: m/s, m/s^2, rad/s, rad/s, A, V")
-          .value("allowed", &BrokenLimit::allowed, "the limit");
-  using A = EstimateAnswer;
-  static const auto table =
-      Table<A>("Energy and ledger of a motion")
-          .include(model_table(), AT(model))
-          .word(
-              "driving",
-              [](const A& a) -> std::string_view {
-                return std::holds_alternative<GivenMotion>(a.input.motion) ? "given"
-                                                                           : name_of(a.input.driving);
-              },
-              std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
-          .value("energy_j", AT(output.accounts.battery_j),
-                 "from the battery; of usual driving the mean, the sum over the legs")
-          .value("duration_s", AT(output.accounts.duration_s), "from start to end")
-          .value("distance_m", AT(output.accounts.distance_m),
-                 "driven distance, forward and backward both positive")
-          .value("turned_rad", AT(output.accounts.turned_rad), "turned angle, both senses positive")
-          .object("energy_quantiles_j", AT(output.energy_quantiles_j),
-                  "of usual driving, the forecast of energy_j; else null", quantiles_table())
-          .value("siblings_pending", [](const A&) { return true; },
-                 "of usual driving while a started daemon still reads missions of its siblings: the forecast "
-                 "will improve",
-                 {{"const", true}})
-          .only(AT(output.siblings_pending))
-          .list(
-              "beyond_limits", AT(output.beyond_limits),
+const auto broken_limit_table =
+    Table<planning::BrokenLimit>()
+        .word("limit", AT(limit),
+              std::array{"speed", "acceleration", "yaw_rate", "wheel_speed", "current", "voltage"},
+              "the exceeded limit")
+        .value("reached", AT(reached),
+               "greatest value of the motion, in the limit's unit: m/s, m/s^2, rad/s, rad/s, A, V")
+        .value("allowed", AT(allowed), "the limit");
+const auto estimate_table =
+    Table<EstimateAnswer>("Energy and ledger of a motion")
+        .include(model_table(), AT(model))
+        .word(
+            "driving",
+            [](const EstimateAnswer& a) -> std::string_view {
+              return std::holds_alternative<GivenMotion>(a.input.motion) ? "given" : name_of(a.input.driving);
+            },
+            std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
+        .value("energy_j", AT(output.accounts.battery_j),
+               "from the battery; of usual driving the mean, the sum over the legs")
+        .value("duration_s", AT(output.accounts.duration_s), "from start to end")
+        .value("distance_m", AT(output.accounts.distance_m),
+               "driven distance, forward and backward both positive")
+        .value("turned_rad", AT(output.accounts.turned_rad), "turned angle, both senses positive")
+        .object("energy_quantiles_j", AT(output.energy_quantiles_j),
+                "of usual driving, the forecast of energy_j; else null", quantiles_table())
+        .value("siblings_pending", [](const EstimateAnswer&) { return true; },
+               "of usual driving while a started daemon still reads missions of its siblings: the forecast "
+               "will improve",
+               {{"const", true}})
+        .only(AT(output.siblings_pending))
+        .list("beyond_limits", AT(output.beyond_limits),
               "limits of the robot that the given motion exceeds: speeds by more than 1e-6 of the limit; "
               "acceleration, current and voltage, which are computed from the slope of rounded speeds, by "
               "more than 0.0015 of it, current and voltage only while a wheel turns at 0.05 rad/s or faster. "
               "Empty for a path: its plan satisfies the limits",
-              broken)
-          .object(
-              "ledger", [](const A& a) { return a.output.energy_quantiles_j ? nullptr : &a.output.accounts; },
-              "null for usual driving: its forecast has no terms", ledger_table())
-          .object(
-              "profile", [](const A& a) -> const auto& { return *a.output.columns; },
-              "the motion over time, if columns are requested; positions are null without start_pose",
-              columns_table(true))
-          .only(AT(output.columns.has_value()));
-  return table;
-}
+              broken_limit_table)
+        .object(
+            "ledger",
+            [](const EstimateAnswer& a) {
+              return a.output.energy_quantiles_j ? nullptr : &a.output.accounts;
+            },
+            "null for usual driving: its forecast has no terms", ledger_table())
+        .object(
+            "profile", [](const EstimateAnswer& a) -> const auto& { return *a.output.columns; },
+            "the motion over time, if columns are requested; positions are null without start_pose",
+            columns_table(true))
+        .only(AT(output.columns.has_value()));
 
 }  // namespace
 
@@ -270,56 +264,52 @@ Result<EstimateOutput> estimate(const EstimateInput& input, const RobotOutlook& 
   return of_optimum(drive, input.columns, *robot.model, stop);
 }
 
-const Input<EstimateInput, PathContext>& estimate_input() {
-  using Part = Input<EstimateInput, PathContext>;
-  static const auto given =
-      Part()
-          .object(
-              "profile",
-              [](EstimateInput& input, const MotionColumns& columns) {
-                given_motion(input).points = points_of(columns);
-              },
-              {}, columns_input())
-          .number(
-              "payload_kg", [](EstimateInput& input) -> double& { return given_motion(input).payload_kg; },
-              not_negative, "at the start", 0,
-              [](const EstimateInput&, const PathContext& context) { return context.payload_limit_kg; })
-          .object(
-              "start_pose",
-              [](EstimateInput& input, const planning::Pose& pose) {
-                given_motion(input).start = {pose.x_m, pose.y_m, pose.heading_rad};
-              },
-              "start of the motion; default for a path: the origin", pose_input(), Presence::optional);
-  static const auto planned =
-      Part()
-          .choice("driving", &EstimateInput::driving, driving_names,
-                  "driving model of a path. minimum_energy: its minimum-energy motion, as returned by the "
-                  "profile operation and independent of the robot's history; usual: the robot's own pace and "
-                  "the consumption estimated from its missions, for robots that do not drive the planner's "
-                  "profile. deadline_s, value_of_time_w, end speeds, limits, regeneration and columns are "
-                  "valid only with minimum_energy",
-                  static_cast<std::size_t>(Driving::minimum_energy))
-          .include(drive_input(),
-                   [](EstimateInput& input) -> DriveInput& { return std::get<DriveInput>(input.motion); })
-          .check(check_usual);
-  static const auto input =
-      Part("A motion to estimate: a profile, or a path")
-          .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)
-          .either(given, planned);
-  return input;
-}
+const auto given_input =
+    Input<EstimateInput, PathContext>()
+        .object(
+            "profile",
+            [](EstimateInput& input, const MotionColumns& columns) {
+              given_motion(input).points = points_of(columns);
+            },
+            {}, columns_input)
+        .number(
+            "payload_kg", [](EstimateInput& input) -> double& { return given_motion(input).payload_kg; },
+            not_negative, "at the start", 0,
+            [](const EstimateInput&, const PathContext& context) { return context.payload_limit_kg; })
+        .object(
+            "start_pose",
+            [](EstimateInput& input, const planning::Pose& pose) {
+              given_motion(input).start = {pose.x_m, pose.y_m, pose.heading_rad};
+            },
+            "start of the motion; default for a path: the origin", pose_input(), Presence::optional);
+const auto planned_input =
+    Input<EstimateInput, PathContext>()
+        .choice("driving", &EstimateInput::driving, driving_names,
+                "driving model of a path. minimum_energy: its minimum-energy motion, as returned by the "
+                "profile operation and independent of the robot's history; usual: the robot's own pace and "
+                "the consumption estimated from its missions, for robots that do not drive the planner's "
+                "profile. deadline_s, value_of_time_w, end speeds, limits, regeneration and columns are "
+                "valid only with minimum_energy",
+                static_cast<std::size_t>(Driving::minimum_energy))
+        .include(drive_input(),
+                 [](EstimateInput& input) -> DriveInput& { return std::get<DriveInput>(input.motion); })
+        .check(check_usual);
+const auto estimate_input =
+    Input<EstimateInput, PathContext>("A motion to estimate: a profile, or a path")
+        .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)
+        .either(given_input, planned_input);
 
 Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel& robot) {
-  return estimate_input().read(request, {.motion = undriven(robot)}, {robot.limits.payload_kg});
+  return estimate_input.read(request, {.motion = undriven(robot)}, {robot.limits.payload_kg});
 }
 
 described::Schemas estimate_schemas() {
-  return {{"estimate-request", estimate_input().schema()}, {"estimate", estimate_table().schema()}};
+  return {{"estimate-request", estimate_input.schema()}, {"estimate", estimate_table.schema()}};
 }
 
 std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
                           const ModelInForce& model) {
-  return estimate_table().text({input, output, model});
+  return estimate_table.text({input, output, model});
 }
 
 Result<std::string> estimate_answer(const Json& request, const RobotOutlook& robot) {

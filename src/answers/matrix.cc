@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -77,31 +76,25 @@ void make_leg(Fields& fields, ReadLeg& read, PathContext&) {
   }
 }
 
-const Input<ReadLeg, PathContext>& leg_input() {
-  static const auto input = Input<ReadLeg, PathContext>("A route; empty: none to drive")
-                                .named("leg")
-                                .object("start_pose", AT(options.start),
-                                        "where a path with places on the map begins; default: the origin",
-                                        pose_input(), Presence::optional)
-                                .include(route_input(), &ReadLeg::way)
-                                .include(former_way_input(), &ReadLeg::way)
-                                .check(make_leg);
-  return input;
-}
+const auto leg_input = Input<ReadLeg, PathContext>("A route; empty: none to drive")
+                           .named("leg")
+                           .object("start_pose", AT(options.start),
+                                   "where a path with places on the map begins; default: the origin",
+                                   pose_input(), Presence::optional)
+                           .include(route_input(), &ReadLeg::way)
+                           .include(former_way_input(), &ReadLeg::way)
+                           .check(make_leg);
 
-const Input<Robot>& robot_input() {
-  static const auto pose =
-      Input<planning::Pose>()
-          .include(point_input<planning::Pose>("place on the map"), std::identity())
-          .number("heading_rad", &planning::Pose::heading_rad, heading_bounds_rad, heading_words, 0);
-  static const auto input =
-      Input<Robot>()
-          .text("robot_id", &Robot::robot_id, max_robot_id_bytes, "the robot of this row")
-          .object("pose", &Robot::pose, "start of the robot; default: its last reported pose", pose)
-          .number("state_of_charge", &Robot::state_of_charge, fraction,
-                  "state of charge; default: the live one");
-  return input;
-}
+const auto robot_pose_input =
+    Input<planning::Pose>()
+        .include(point_input<planning::Pose>("place on the map"), std::identity())
+        .number("heading_rad", &planning::Pose::heading_rad, heading_bounds_rad, heading_words, 0);
+const auto robot_input =
+    Input<Robot>()
+        .text("robot_id", &Robot::robot_id, max_robot_id_bytes, "the robot of this row")
+        .object("pose", &Robot::pose, "start of the robot; default: its last reported pose", robot_pose_input)
+        .number("state_of_charge", &Robot::state_of_charge, fraction,
+                "state of charge; default: the live one");
 
 // A column of the request, for so many robots.
 struct ReadTask {
@@ -120,7 +113,7 @@ void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
   if (empty == nullptr) return;
   const auto add = [&](const Json& leg, std::string at) {
     ReadLeg one;
-    leg_input().nested(leg, std::move(at), one, context, fields);
+    leg_input.nested(leg, std::move(at), one, context, fields);
     read.task.empty.push_back(std::move(one.leg));
     read.former = read.former || one.way.former;
   };
@@ -143,29 +136,25 @@ void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
     fields.fault("dropoff", fmt::format("is farther than {} m from the pick-up", planning::longest_leg_m));
 }
 
-const Input<ReadTask, MatrixContext>& matrix_task_input() {
-  static const auto input =
-      Input<ReadTask, MatrixContext>()
-          .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
-          .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
-                  "carried from the pick-up to the drop-off", 0)
-          .include(stations_input(), AT(task.stations))
-          .custom("empty",
-                  {{"oneOf", {leg_input().of_member(), described::of_array(leg_input().of_member())}}},
-                  "route to the pick-up, common to all robots or one for each in order; replaces a turn "
-                  "towards it and a straight line",
-                  read_empty)
-          .object(
-              "loaded",
-              [](ReadTask& read, ReadLeg&& leg) {
-                read.task.loaded = std::move(leg.leg);
-                read.former = read.former || leg.way.former;
-              },
-              "route from the pick-up to the drop-off, in place of a turn and a straight line", leg_input(),
-              Presence::optional)
-          .check(check_stations);
-  return input;
-}
+const auto matrix_task_input =
+    Input<ReadTask, MatrixContext>()
+        .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
+        .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
+                "carried from the pick-up to the drop-off", 0)
+        .include(stations_input(), AT(task.stations))
+        .custom("empty", {{"oneOf", {leg_input.of_member(), described::of_array(leg_input.of_member())}}},
+                "route to the pick-up, common to all robots or one for each in order; replaces a turn "
+                "towards it and a straight line",
+                read_empty)
+        .object(
+            "loaded",
+            [](ReadTask& read, ReadLeg&& leg) {
+              read.task.loaded = std::move(leg.leg);
+              read.former = read.former || leg.way.former;
+            },
+            "route from the pick-up to the drop-off, in place of a turn and a straight line", leg_input,
+            Presence::optional)
+        .check(check_stations);
 
 // Checked before any robot and task is read.
 void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
@@ -182,102 +171,88 @@ void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
                               tasks->size(), cells, most, usual ? " of usual driving" : "")});
 }
 
-const Table<MatrixRow>& row_table() {
-  using planning::name_of;
-  using planning::Obstacle;
-  using Why = MatrixRow::Infeasible;
-  using R = MatrixRow;
-  static const auto infeasible =
-      Table<Why>()
-          .word(
-              "reason", [](const Why& why) { return name_of(why.reason); },
-              std::array{name_of(Obstacle::model), name_of(Obstacle::pose), name_of(Obstacle::payload),
-                         name_of(Obstacle::limits)},
-              "model: the robot is unknown or has no model; pose: its position is unknown and the task does "
-              "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
-              "within its limits with this payload")
-          .value("detail", &Why::detail, "the same in a sentence")
-          .texts("task_ids", &Why::task_ids, "ids of the tasks, in the order of the request");
-  static const auto table =
-      Table<R>()
-          .value("robot_id", &R::robot_id, "the robot of this row")
-          .value("model_version", &R::model_version, "null where the robot has no model")
-          .value("interpolation_error", &R::interpolation_error,
-                 "largest relative error of the interpolated costs compared with the planner's; null for "
-                 "usual driving, which is computed leg by leg")
-          .texts("neglected_effects", &R::neglected_effects,
-                 "adopted effects that depend on the position on the floor, which are not included in these "
-                 "costs")
-          .column(
-              "energy_j", &R::energy_j,
-              "energy from the battery, dwells included; for usual driving the mean, the sum over the legs; "
-              "null where infeasible",
-              places, true)
-          .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
-          .column("success_probability", &R::success_probability,
-                  "probability that the robot ends this task alone, in the requested driving model, with at "
-                  "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
-                  probability_places, true)
-          .column("charge_needed", &R::charge_needed,
-                  "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
-                  "which it ends with the reserve with a probability of 95 %; null where the charge "
-                  "suffices, where a full one does not, and where infeasible",
-                  probability_places, true)
-          .column("available_in_s", &R::available_in_s,
-                  "time at its charger until the robot has that charge, if charge arrives evenly until the "
-                  "charger's end, which is at most too long; 0 where the charge suffices; null where it is "
-                  "not known: not at a charger, or a given charge",
-                  places, true)
-          .value("siblings_pending", &R::siblings_pending,
-                 "of forecasts while a started daemon still reads missions of its siblings",
-                 {{"const", true}})
-          .only(&R::siblings_pending)
-          .list("infeasible", &R::infeasible, "infeasible tasks of this robot, by reason", infeasible);
-  return table;
-}
+const auto infeasible_table =
+    Table<MatrixRow::Infeasible>()
+        .word(
+            "reason", [](const MatrixRow::Infeasible& why) { return name_of(why.reason); },
+            std::array{name_of(Obstacle::model), name_of(Obstacle::pose), name_of(Obstacle::payload),
+                       name_of(Obstacle::limits)},
+            "model: the robot is unknown or has no model; pose: its position is unknown and the task does "
+            "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
+            "within its limits with this payload")
+        .value("detail", AT(detail), "the same in a sentence")
+        .texts("task_ids", AT(task_ids), "ids of the tasks, in the order of the request");
+const auto row_table =
+    Table<MatrixRow>()
+        .value("robot_id", AT(robot_id), "the robot of this row")
+        .value("model_version", AT(model_version), "null where the robot has no model")
+        .value("interpolation_error", AT(interpolation_error),
+               "largest relative error of the interpolated costs compared with the planner's; null for "
+               "usual driving, which is computed leg by leg")
+        .texts("neglected_effects", AT(neglected_effects),
+               "adopted effects that depend on the position on the floor, which are not included in these "
+               "costs")
+        .column(
+            "energy_j", AT(energy_j),
+            "energy from the battery, dwells included; for usual driving the mean, the sum over the legs; "
+            "null where infeasible",
+            places, true)
+        .column("duration_s", AT(duration_s), "duration of each task; null: infeasible", places, true)
+        .column("success_probability", AT(success_probability),
+                "probability that the robot ends this task alone, in the requested driving model, with at "
+                "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
+                probability_places, true)
+        .column("charge_needed", AT(charge_needed),
+                "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
+                "which it ends with the reserve with a probability of 95 %; null where the charge "
+                "suffices, where a full one does not, and where infeasible",
+                probability_places, true)
+        .column("available_in_s", AT(available_in_s),
+                "time at its charger until the robot has that charge, if charge arrives evenly until the "
+                "charger's end, which is at most too long; 0 where the charge suffices; null where it is "
+                "not known: not at a charger, or a given charge",
+                places, true)
+        .value("siblings_pending", AT(siblings_pending),
+               "of forecasts while a started daemon still reads missions of its siblings", {{"const", true}})
+        .only(AT(siblings_pending))
+        .list("infeasible", AT(infeasible), "infeasible tasks of this robot, by reason", infeasible_table);
 
 // Without the rows.
-const Table<MatrixInput>& head_table() {
-  static const auto table =
-      Table<MatrixInput>()
-          .word("driving", &MatrixInput::driving, driving_names, "as requested, or the default")
-          .value("value_of_time_w", AT(options.value_of_time_w), "requested value of time")
-          .texts("task_ids", &MatrixInput::task_ids, "ids in the order of the columns")
-          .texts("tasks", &MatrixInput::task_ids, "task_ids by its former name", {{"deprecated", true}});
-  return table;
-}
+const auto head_table =
+    Table<MatrixInput>()
+        .word("driving", AT(driving), driving_names, "as requested, or the default")
+        .value("value_of_time_w", AT(options.value_of_time_w), "requested value of time")
+        .texts("task_ids", AT(task_ids), "ids in the order of the columns")
+        .texts("tasks", AT(task_ids), "task_ids by its former name", {{"deprecated", true}});
 
-const Input<MatrixInput, MatrixContext>& matrix_input() {
-  static const auto input =
-      Input<MatrixInput, MatrixContext>(
-          "Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
-          .choice("driving", &MatrixInput::driving, driving_names,
-                  "driving model. minimum_energy: minimum-energy motions from stop to stop, equal for equal "
-                  "robots and independent of their history; usual: each robot's own pace and the consumption "
-                  "estimated from its missions, for fleets that do not drive the planner's profiles. "
-                  "value_of_time_w and regeneration are valid only with minimum_energy",
-                  static_cast<std::size_t>(Driving::minimum_energy))
-          .number("value_of_time_w", AT(options.value_of_time_w), value_of_time_bounds_w,
-                  "value of time, added to the energy", 0)
-          .number("regeneration", AT(options.regeneration), fraction,
-                  "recovered share of braking power; replaces that of each robot file")
-          .number("reserve_fraction", &MatrixInput::reserve_fraction, fraction,
-                  "charge to be left after a task, for its success probability; default the robot file's")
-          .check(check_size)
-          .list("robots", &MatrixInput::robots, robots_of_matrix,
-                "the rows: ids of robots, or robots with a pose and a charge",
-                described::OrText(&Robot::robot_id, "robot id; the start is its last reported pose",
-                                  robot_input()))
-          .list(
-              "tasks",
-              [](MatrixInput& matrix, ReadTask&& read) {
-                matrix.task_ids.push_back(std::move(read.task_id));
-                matrix.tasks.push_back(std::move(read.task));
-                matrix.former = matrix.former || read.former;
-              },
-              tasks_of_matrix, "the columns", matrix_task_input());
-  return input;
-}
+const auto matrix_input =
+    Input<MatrixInput, MatrixContext>(
+        "Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
+        .choice("driving", &MatrixInput::driving, driving_names,
+                "driving model. minimum_energy: minimum-energy motions from stop to stop, equal for equal "
+                "robots and independent of their history; usual: each robot's own pace and the consumption "
+                "estimated from its missions, for fleets that do not drive the planner's profiles. "
+                "value_of_time_w and regeneration are valid only with minimum_energy",
+                static_cast<std::size_t>(Driving::minimum_energy))
+        .number("value_of_time_w", AT(options.value_of_time_w), value_of_time_bounds_w,
+                "value of time, added to the energy", 0)
+        .number("regeneration", AT(options.regeneration), fraction,
+                "recovered share of braking power; replaces that of each robot file")
+        .number("reserve_fraction", &MatrixInput::reserve_fraction, fraction,
+                "charge to be left after a task, for its success probability; default the robot file's")
+        .check(check_size)
+        .list(
+            "robots", &MatrixInput::robots, robots_of_matrix,
+            "the rows: ids of robots, or robots with a pose and a charge",
+            described::OrText(&Robot::robot_id, "robot id; the start is its last reported pose", robot_input))
+        .list(
+            "tasks",
+            [](MatrixInput& matrix, ReadTask&& read) {
+              matrix.task_ids.push_back(std::move(read.task_id));
+              matrix.tasks.push_back(std::move(read.task));
+              matrix.former = matrix.former || read.former;
+            },
+            tasks_of_matrix, "the columns", matrix_task_input);
 
 }  // namespace
 
@@ -490,19 +465,19 @@ MatrixRow Matrix::row(std::size_t r, const std::stop_token& stop) const {
 
 described::Schemas matrix_schemas() {
   static const auto answer = Table<MatrixInput>("Cost of every task with every robot")
-                                 .include(head_table(), std::identity())
+                                 .include(head_table, std::identity())
                                  .list(
                                      "rows", [](const MatrixInput&) { return std::vector<MatrixRow>(); },
-                                     "one row per robot, in the order of the request", row_table());
-  return {{"energy-matrix-request", matrix_input().schema()},
-          {"leg", leg_input().schema()},
+                                     "one row per robot, in the order of the request", row_table);
+  return {{"energy-matrix-request", matrix_input.schema()},
+          {"leg", leg_input.schema()},
           {"energy-matrix", answer.schema()}};
 }
 
 Result<MatrixInput> read_matrix(const Json& request) {
   MatrixContext context;
   context.may_stand = true;
-  return matrix_input().read(request, {}, context);
+  return matrix_input.read(request, {}, context);
 }
 
 bool MatrixText::next(std::string& out, const std::stop_token& left) {
@@ -513,7 +488,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const MatrixInput& input = matrix_.input();
   if (!begun_) {
     JsonWriter head;
-    head_table().write_members(head.begin_object(), input);
+    head_table.write_members(head.begin_object(), input);
     out += head.text();
     out += ",\"rows\":[";
     begun_ = true;
@@ -521,7 +496,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const std::size_t count = std::min(rows_per_piece, input.robots.size() - rows_done_);
   std::array<JsonWriter, rows_per_piece> rows;
   parallel_for(count, 2, [&](std::size_t k) {
-    if (!left.stop_requested()) row_table().write(rows[k], matrix_.row(rows_done_ + k, left));
+    if (!left.stop_requested()) row_table.write(rows[k], matrix_.row(rows_done_ + k, left));
   });
   if (left.stop_requested()) return false;
   for (std::size_t k = 0; k < count; ++k) {

@@ -5,7 +5,6 @@
 #include <string_view>
 #include <utility>
 
-#include "signals/ledger.h"
 #include "signals/sample.h"
 
 namespace joulecast::answers {

@@ -78,50 +78,46 @@ constexpr std::int64_t max_pareto_points = 200;
 using described::Table;
 using planning::Baseline;
 using planning::Certificate;
+using planning::Method;
 using planning::PlanCost;
 
 constexpr const char* drawn_words = "energy drawn from the battery";
 
-std::vector<std::string_view> names_of(const std::vector<planning::Bound>& bounds) {
-  std::vector<std::string_view> names;
-  for (const planning::Bound bound : bounds) names.push_back(planning::name_of(bound));
+const std::array method_names{name_of(Method::closed_form), name_of(Method::quadrature),
+                              name_of(Method::interior_point), name_of(Method::mixed)};
+const auto bound_names = [] {
+  std::array<std::string_view, planning::bound_count> names;
+  for (std::size_t k = 0; k < names.size(); ++k) names[k] = name_of(static_cast<planning::Bound>(k));
   return names;
-}
+}();
 
-const Table<Certificate>& certificate_table() {
-  using C = Certificate;
-  using planning::Method;
-  std::vector<planning::Bound> bounds;
-  for (std::size_t k = 0; k < planning::bound_count; ++k) bounds.push_back(static_cast<planning::Bound>(k));
-  static const std::array methods{
-      planning::name_of(Method::closed_form), planning::name_of(Method::quadrature),
-      planning::name_of(Method::interior_point), planning::name_of(Method::mixed)};
-  static const auto table =
-      Table<C>()
-          .word("method", &C::method, methods, "how it was solved")
-          .value("gap_j", &C::gap_j,
-                 "energy plus value of time, minus gap_j, is a lower bound of the optimum where the problem "
-                 "is convex")
-          .value("discretisation_j", &C::discretisation_j,
-                 "estimated excess over the optimum due to constant acceleration between rows, in addition "
-                 "to gap_j")
-          .value("residual", &C::residual, "residual of the optimality conditions, 0 at the optimum")
-          .value("convex", &C::convex,
-                 "whether the problem is convex, so that the optimum is global. Otherwise gap_j compares "
-                 "with motions near this one only, and no bound on the least energy of all motions is given")
-          .number_or_null(
-              "time_multiplier_w", &C::time_multiplier_w,
-              "energy cost of shortening the duration, J per second; 0: no other duration needs less energy; "
-              "null: none is shorter. The shortest feasible duration is shortest_time_s")
-          .number_or_null("shortest_time_s", &C::shortest_time_s,
-                          "shortest duration within the limits, relative accuracy 1e-4; every later deadline "
-                          "is met; null: no limit bounds the duration")
-          .words_of(
-              "binding", [](const C& c) { return names_of(c.binding); }, names_of(bounds),
-              "binding limits, which cost time or energy")
-          .value("iterations", &C::iterations, "of the interior point method, in all searches");
-  return table;
-}
+const auto certificate_table =
+    Table<Certificate>()
+        .word("method", AT(method), method_names, "how it was solved")
+        .value("gap_j", AT(gap_j),
+               "energy plus value of time, minus gap_j, is a lower bound of the optimum where the problem "
+               "is convex")
+        .value("discretisation_j", AT(discretisation_j),
+               "estimated excess over the optimum due to constant acceleration between rows, in addition "
+               "to gap_j")
+        .value("residual", AT(residual), "residual of the optimality conditions, 0 at the optimum")
+        .value("convex", AT(convex),
+               "whether the problem is convex, so that the optimum is global. Otherwise gap_j compares "
+               "with motions near this one only, and no bound on the least energy of all motions is given")
+        .number_or_null(
+            "time_multiplier_w", AT(time_multiplier_w),
+            "energy cost of shortening the duration, J per second; 0: no other duration needs less energy; "
+            "null: none is shorter. The shortest feasible duration is shortest_time_s")
+        .number_or_null("shortest_time_s", AT(shortest_time_s),
+                        "shortest duration within the limits, relative accuracy 1e-4; every later deadline "
+                        "is met; null: no limit bounds the duration")
+        .words_of(
+            "binding",
+            [](const Certificate& c) {
+              return c.binding | std::views::transform([](auto bound) { return name_of(bound); });
+            },
+            bound_names, "binding limits, which cost time or energy")
+        .value("iterations", AT(iterations), "of the interior point method, in all searches");
 
 struct BaselineAnswer {
   const ProfileOutput::Baseline& baseline;
@@ -134,91 +130,81 @@ struct ProfileAnswer {
   const ModelInForce& model;
 };
 
-const Table<ProfileAnswer>& baselines_table() {
-  using A = ProfileAnswer;
-  static const auto motion =
-      Table<Baseline>()
-          .column("time_s", &Baseline::time_s, "time since the start")
-          .column("speed_m_s", &Baseline::speed_m_s, "forward speed; negative: backwards")
-          .column("yaw_rate_rad_s", &Baseline::yaw_rate_rad_s, "rate of turning, positive to the left")
-          .all_digits("power_w", &Baseline::power_w, "power drawn from the battery", false)
-          .all_digits("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", false);
-  static const auto slowed = Table<Baseline>()
-                                 .value("energy_j", &Baseline::energy_j, drawn_words)
-                                 .value("duration_s", &Baseline::duration_s, "from start to end");
-  static const auto baseline =
-      Table<BaselineAnswer>()
-          .value("energy_j", AT(baseline.motion.energy_j), drawn_words)
-          .value("duration_s", AT(baseline.motion.duration_s), "from start to end")
-          .value("peak_speed_m_s", AT(baseline.motion.peak_speed_m_s), "greatest speed")
-          .value("within_limits", AT(baseline.within_limits), "whether the robot can drive it")
-          .value("saving_fraction", AT(baseline.saving_fraction),
-                 "relative energy saving of the optimum compared with it")
-          .object("profile", AT(baseline.motion), "its motion over time, if baseline_columns is requested",
-                  motion)
-          .only(AT(columns))
-          .object(
-              "slowed", AT(baseline.slowed),
-              "if baseline_columns is requested and it exceeds the limits: the same motion in a longer time "
-              "in which it keeps them; null: none",
-              slowed)
-          .only(AT(columns));
-  const auto shape = [](std::optional<ProfileOutput::Baseline> ProfileOutput::*member) {
-    return [member](const A& a) -> std::optional<BaselineAnswer> {
-      if (!(a.output.*member)) return std::nullopt;
-      return BaselineAnswer{*(a.output.*member), a.input.baseline_columns};
-    };
+const auto baseline_motion_table =
+    Table<Baseline>()
+        .column("time_s", AT(time_s), "time since the start")
+        .column("speed_m_s", AT(speed_m_s), "forward speed; negative: backwards")
+        .column("yaw_rate_rad_s", AT(yaw_rate_rad_s), "rate of turning, positive to the left")
+        .all_digits("power_w", AT(power_w), "power drawn from the battery", false)
+        .all_digits("energy_j", AT(energy_column_j), "drawn from the battery up to here", false);
+const auto slowed_table = Table<Baseline>()
+                              .value("energy_j", AT(energy_j), drawn_words)
+                              .value("duration_s", AT(duration_s), "from start to end");
+const auto baseline_table =
+    Table<BaselineAnswer>()
+        .value("energy_j", AT(baseline.motion.energy_j), drawn_words)
+        .value("duration_s", AT(baseline.motion.duration_s), "from start to end")
+        .value("peak_speed_m_s", AT(baseline.motion.peak_speed_m_s), "greatest speed")
+        .value("within_limits", AT(baseline.within_limits), "whether the robot can drive it")
+        .value("saving_fraction", AT(baseline.saving_fraction),
+               "relative energy saving of the optimum compared with it")
+        .object("profile", AT(baseline.motion), "its motion over time, if baseline_columns is requested",
+                baseline_motion_table)
+        .only(AT(columns))
+        .object(
+            "slowed", AT(baseline.slowed),
+            "if baseline_columns is requested and it exceeds the limits: the same motion in a longer time "
+            "in which it keeps them; null: none",
+            slowed_table)
+        .only(AT(columns));
+const auto shape = [](std::optional<ProfileOutput::Baseline> ProfileOutput::*member) {
+  return [member](const ProfileAnswer& a) -> std::optional<BaselineAnswer> {
+    if (!(a.output.*member)) return std::nullopt;
+    return BaselineAnswer{*(a.output.*member), a.input.baseline_columns};
   };
-  static const auto table =
-      Table<A>()
-          .object(
-              "trapezoid", shape(&ProfileOutput::trapezoid),
-              "constant acceleration, constant speed, constant deceleration; null: not possible on the path",
-              baseline)
-          .object("triangle", shape(&ProfileOutput::triangle),
-                  "constant acceleration, then constant deceleration; null: not possible on the path",
-                  baseline);
-  return table;
-}
+};
+const auto baselines_table =
+    Table<ProfileAnswer>()
+        .object(
+            "trapezoid", shape(&ProfileOutput::trapezoid),
+            "constant acceleration, constant speed, constant deceleration; null: not possible on the path",
+            baseline_table)
+        .object("triangle", shape(&ProfileOutput::triangle),
+                "constant acceleration, then constant deceleration; null: not possible on the path",
+                baseline_table);
 
-const Table<ProfileAnswer>& profile_table() {
-  static const auto point = Table<PlanCost>()
-                                .value("duration_s", &PlanCost::duration_s, "duration of this compromise")
-                                .value("energy_j", &PlanCost::energy_j, drawn_words)
-                                .value("time_multiplier_w", &PlanCost::time_multiplier_w,
-                                       "energy cost of shortening the duration, J per second")
-                                .value("peak_speed_m_s", &PlanCost::peak_speed_m_s, "greatest speed");
-  using A = ProfileAnswer;
-  static const auto table =
-      Table<A>("A minimum-energy motion")
-          .include(model_table(), AT(model))
-          .value("energy_j", AT(output.plan.summary.energy_j), drawn_words)
-          .value("duration_s", AT(output.plan.summary.duration_s), "from start to end")
-          .value("distance_m", AT(output.plan.summary.distance_m),
-                 "driven distance, forward and backward both positive")
-          .value("turned_rad", AT(output.plan.summary.turned_rad), "turned angle, both senses positive")
-          .value("peak_speed_m_s", AT(output.plan.summary.peak_speed_m_s), "greatest speed")
-          .value("peak_yaw_rate_rad_s", AT(output.plan.summary.peak_yaw_rate_rad_s),
-                 "greatest rate of turning")
-          .value("peak_power_w", AT(output.plan.summary.peak_power_w), "greatest power from the battery")
-          .value("braking_j", AT(output.plan.summary.braking_j),
-                 "energy that braking turns to heat or returns")
-          .value("recovered_j", AT(output.plan.summary.recovered_j), "of braking_j, returned to the battery")
-          .object("certificate", AT(output.plan.certificate), "proof of its distance from the optimum",
-                  certificate_table())
-          .object("ledger_j", AT(output.plan.ledger), "energy by term", terms_table())
-          .object("baselines", std::identity(),
-                  "profiles of the same duration on every run between stops; null: no such profile exists",
-                  baselines_table())
-          .value("needed_speed_m_s", AT(output.needed_speed_m_s),
-                 "lowest speed limit with which the deadline can be met; null without a deadline")
-          .list("pareto", AT(output.pareto),
-                "other compromises between time and energy, in the requested number", point)
-          .object("profile", AT(output.plan.profile), "the motion over time, if columns are requested",
-                  columns_table(false))
-          .only(AT(input.columns));
-  return table;
-}
+const auto pareto_table = Table<PlanCost>()
+                              .value("duration_s", AT(duration_s), "duration of this compromise")
+                              .value("energy_j", AT(energy_j), drawn_words)
+                              .value("time_multiplier_w", AT(time_multiplier_w),
+                                     "energy cost of shortening the duration, J per second")
+                              .value("peak_speed_m_s", AT(peak_speed_m_s), "greatest speed");
+const auto profile_table =
+    Table<ProfileAnswer>("A minimum-energy motion")
+        .include(model_table(), AT(model))
+        .value("energy_j", AT(output.plan.summary.energy_j), drawn_words)
+        .value("duration_s", AT(output.plan.summary.duration_s), "from start to end")
+        .value("distance_m", AT(output.plan.summary.distance_m),
+               "driven distance, forward and backward both positive")
+        .value("turned_rad", AT(output.plan.summary.turned_rad), "turned angle, both senses positive")
+        .value("peak_speed_m_s", AT(output.plan.summary.peak_speed_m_s), "greatest speed")
+        .value("peak_yaw_rate_rad_s", AT(output.plan.summary.peak_yaw_rate_rad_s), "greatest rate of turning")
+        .value("peak_power_w", AT(output.plan.summary.peak_power_w), "greatest power from the battery")
+        .value("braking_j", AT(output.plan.summary.braking_j), "energy that braking turns to heat or returns")
+        .value("recovered_j", AT(output.plan.summary.recovered_j), "of braking_j, returned to the battery")
+        .object("certificate", AT(output.plan.certificate), "proof of its distance from the optimum",
+                certificate_table)
+        .object("ledger_j", AT(output.plan.ledger), "energy by term", terms_table())
+        .object("baselines", std::identity(),
+                "profiles of the same duration on every run between stops; null: no such profile exists",
+                baselines_table)
+        .value("needed_speed_m_s", AT(output.needed_speed_m_s),
+               "lowest speed limit with which the deadline can be met; null without a deadline")
+        .list("pareto", AT(output.pareto),
+              "other compromises between time and energy, in the requested number", pareto_table)
+        .object("profile", AT(output.plan.profile), "the motion over time, if columns are requested",
+                columns_table(false))
+        .only(AT(input.columns));
 
 }  // namespace
 
@@ -249,44 +235,40 @@ std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const Mo
   return out ? std::optional(std::move(*out)) : std::nullopt;
 }
 
-const described::Input<ProfileInput, PathContext>& profile_input() {
-  static const auto input =
-      described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
-          .include(drive_input(), &ProfileInput::drive)
-          .number(
-              "energy_budget_j", AT(drive.problem.energy_budget_j), positive,
-              "the fastest motion that takes at most so much energy; without deadline_s and value_of_time_w")
-          .check([](Fields& fields, ProfileInput& profile, PathContext&) {
-            const planning::Problem& problem = profile.drive.problem;
-            if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
-              fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
-          })
-          .boolean("columns", &ProfileInput::columns,
-                   "false leaves the profile out; a motion of more than 500000 rows is refused", true)
-          .boolean("baseline_columns", &ProfileInput::baseline_columns,
-                   "true gives the trapezoid's and the triangle's motion over time too, and how they are "
-                   "slowed to the limits",
-                   false)
-          .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
-                   "points of the front of energy against time", 0);
-  return input;
-}
+const auto profile_input =
+    described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
+        .include(drive_input(), &ProfileInput::drive)
+        .number(
+            "energy_budget_j", AT(drive.problem.energy_budget_j), positive,
+            "the fastest motion that takes at most so much energy; without deadline_s and value_of_time_w")
+        .check([](Fields& fields, ProfileInput& profile, PathContext&) {
+          const planning::Problem& problem = profile.drive.problem;
+          if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
+            fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
+        })
+        .boolean("columns", &ProfileInput::columns,
+                 "false leaves the profile out; a motion of more than 500000 rows is refused", true)
+        .boolean("baseline_columns", &ProfileInput::baseline_columns,
+                 "true gives the trapezoid's and the triangle's motion over time too, and how they are "
+                 "slowed to the limits",
+                 false)
+        .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
+                 "points of the front of energy against time", 0);
 
 Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot) {
-  TRY_ASSIGN(auto input,
-             profile_input().read(request, {.drive = undriven(robot)}, {robot.limits.payload_kg}));
+  TRY_ASSIGN(auto input, profile_input.read(request, {.drive = undriven(robot)}, {robot.limits.payload_kg}));
   input.drive.problem.rows = input.columns;
   return input;
 }
 
 described::Schemas profile_schemas() {
-  described::Schema request = profile_input().schema();
+  described::Schema request = profile_input.schema();
   for (const std::string_view name : way_members) request["anyOf"].push_back({{"required", {name}}});
-  return {{"profile-request", std::move(request)}, {"profile", profile_table().schema()}};
+  return {{"profile-request", std::move(request)}, {"profile", profile_table.schema()}};
 }
 
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model) {
-  return profile_table().text({input, output, model});
+  return profile_table.text({input, output, model});
 }
 
 Result<std::string> profile_answer(const nlohmann::json& request, const ModelInForce& model) {
