@@ -68,10 +68,9 @@ http::Response page_response(
 
 // The same items as CSV.
 template <class Items, class Write>
-http::Response csv_response(const http::Request& request, const std::string& name,
-                            std::vector<std::string> columns, const Items& items, const Write& write,
-                            std::string_view cursor = {}) {
-  Csv csv(request, std::move(columns));
+http::Response csv_response(const http::Request& request, const std::string& name, std::string_view columns,
+                            const Items& items, const Write& write, std::string_view cursor = {}) {
+  Csv csv(request, columns);
   for (const auto& item : items) {
     JsonWriter json;
     write_item(json, item, write);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/json_writer.h"
 #include "base/text.h"
@@ -32,10 +31,10 @@ bool may_be_formula(std::string_view text) {
 
 }  // namespace
 
-Csv::Csv(const http::Request& request, std::vector<std::string> columns)
-    : columns_(std::move(columns)),
-      digits_(static_cast<int>(request.query_integer("digits").value_or(http::usual_digits))) {
-  for (const std::string& column : columns_) {
+Csv::Csv(const http::Request& request, std::string_view columns)
+    : digits_(static_cast<int>(request.query_integer("digits").value_or(http::usual_digits))) {
+  while (!columns.empty()) {
+    const std::string& column = columns_.emplace_back(take_item(columns, ' '));
     const std::string title = column.substr(0, column.find_first_of("=?"));
     field(title.substr(title.rfind('/') + 1));
   }

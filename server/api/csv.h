@@ -16,7 +16,8 @@ class Csv {
  public:
   // Numbers have the precision of the request's ?digits=. A column is a member of the items, titled by its
   // name: "state", "energy/battery_j", with another title "x_m=pose/0". "annulled?": whether there is one.
-  Csv(const http::Request& request, std::vector<std::string> columns);
+  // Blanks separate columns.
+  Csv(const http::Request& request, std::string_view columns);
 
   Csv& field(std::string_view text);
   Csv& field(const char* text) { return field(std::string_view(text)); }
@@ -36,7 +37,7 @@ class Csv {
     if (std::exchange(comma_, true)) text_ += ',';
   }
 
-  const std::vector<std::string> columns_;
+  std::vector<std::string> columns_;
   int digits_;
   std::string text_;
   bool comma_ = false;

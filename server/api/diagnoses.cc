@@ -130,8 +130,8 @@ Result<Response> list_diagnoses(const Services& services, const Request& request
   };
   if (request.csv)
     return csv_response(request, "diagnoses",
-                        {"id", "robot_id", "state", "cause", "created", "created_utime_us",
-                         "started_utime_us", "finished_utime_us", "model_version", "error"},
+                        "id robot_id state cause created created_utime_us started_utime_us finished_utime_us "
+                        "model_version error",
                         found, write, next);
   return page_response("diagnoses", found, write, next);
 }

@@ -95,10 +95,9 @@ Result<Response> gap_history(const Services& services, const Request& request) {
   TRY_ASSIGN(auto missions,
              services.drift.missions(id, static_cast<std::size_t>(*request.query_integer("limit"))));
   if (request.csv)
-    return csv_response(
-        request, "robot-" + id + "-gap-history",
-        {"id", "start", "start_utime_us", "model_version", "measured_j", "modelled_j", "ratio"}, missions,
-        ratio_table);
+    return csv_response(request, "robot-" + id + "-gap-history",
+                        "id start start_utime_us model_version measured_j modelled_j ratio", missions,
+                        ratio_table);
   TRY_ASSIGN(auto marks, services.drift.marks(id));
   TRY_ASSIGN(auto siblings, services.drift.siblings(id));
   TRY_ASSIGN(auto versions, services.store.model_versions(id));
@@ -120,8 +119,8 @@ Result<Response> list_events(const Services& services, const Request& request) {
   TRY_ASSIGN(const auto found, services.store.events(query.behind_id, query.limit, query.filter));
   const std::string next = next_id_cursor(found, query.limit, &history::Event::id);
   if (request.csv)
-    return csv_response(request, "event-log", {"id", "time", "utime_us", "robot_id", "kind", "detail"}, found,
-                        event_table, next);
+    return csv_response(request, "event-log", "id time utime_us robot_id kind detail", found, event_table,
+                        next);
   return page_response("events", found, event_table, next);
 }
 

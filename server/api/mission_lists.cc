@@ -83,27 +83,20 @@ history::MissionSort sort_of(const Request& request) {
 }
 
 // Columns of missions and of sums over them, with the common ones between the others.
-std::vector<std::string> with_accounts(std::vector<std::string> columns,
-                                       const std::vector<std::string>& more = {}) {
-  for (const char* column : {"ratio", "wh_per_km", "energy/battery_j", "energy/measured_j",
-                             "energy/measured_s", "energy/modelled_j", "energy/unexplained_j",
-                             "energy/drawn_j", "energy/returned_j", "energy/charge_ah", "energy/distance_m",
-                             "energy/turned_rad", "energy/duration_s", "samples", "gap_count", "gap_s"})
-    columns.emplace_back(column);
-  columns.insert(columns.end(), more.begin(), more.end());
-  return columns;
-}
+const std::string account_columns =
+    " ratio wh_per_km energy/battery_j energy/measured_j energy/measured_s energy/modelled_j "
+    "energy/unexplained_j energy/drawn_j energy/returned_j energy/charge_ah energy/distance_m "
+    "energy/turned_rad energy/duration_s samples gap_count gap_s";
 
 Result<Response> list_missions(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
   TRY_ASSIGN(history::MissionPage found, services.store.missions(filter, page_of(request), sort_of(request)));
   if (request.csv)
-    return csv_response(
-        request, "missions",
-        with_accounts({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason", "start",
-                       "end", "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
-                      {"annulled?", "note"}),
-        found.missions, answers::mission_table(), found.next_cursor);
+    return csv_response(request, "missions",
+                        "id robot_id mission_id state incomplete incomplete_reason start end start_utime_us "
+                        "end_utime_us payload_kg model_version" +
+                            account_columns + " annulled? note",
+                        found.missions, answers::mission_table(), found.next_cursor);
   return page_response("missions", found.missions, answers::mission_table(), found.next_cursor);
 }
 
@@ -211,10 +204,9 @@ Result<Response> totals(const Services& services, const Request& request) {
   TRY_ASSIGN(const std::vector<Group> groups, groups_of(services, request, filter));
   const bool grouped = request.query_value("group_by").has_value();
   if (request.csv)
-    return csv_response(
-        request, "mission-totals",
-        with_accounts({"robots", "from", "to", "missions", "measured_missions", "incomplete_missions"}),
-        grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}, group_table);
+    return csv_response(request, "mission-totals",
+                        "robots from to missions measured_missions incomplete_missions" + account_columns,
+                        grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}, group_table);
   const TotalsAnswer answer{all, grouped ? std::optional(groups) : std::nullopt};
   return http::json_response(totals_answer_table.text(answer));
 }

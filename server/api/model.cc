@@ -292,10 +292,10 @@ Result<Response> proposals_of(const Services& services, const Request& request,
     proposal_table.write(out, {services, proposal, dismissed});
   };
   if (request.csv)
-    return csv_response(request, "proposals",
-                        {"id", "robot_id", "created", "created_utime_us", "kind", "state", "closed_reason",
-                         "note", "base_version", "adopted_version"},
-                        found, write, next);
+    return csv_response(
+        request, "proposals",
+        "id robot_id created created_utime_us kind state closed_reason note base_version adopted_version",
+        found, write, next);
   return page_response("proposals", found, write, next, [&](JsonWriter& out) { out.field("robot_id", id); });
 }
 

@@ -172,7 +172,7 @@ TEST_F(IdempotencyTest, ChecksKeySyntaxAndLength) {
 
 TEST(Csv, GuardsFormulae) {
   const auto written = [](const std::string& text) {
-    Csv csv({}, {"note"});
+    Csv csv({}, "note");
     csv.field(text).end_row();
     const std::string body = csv.response("notes").body;
     return body.substr(body.find('\n') + 1);
