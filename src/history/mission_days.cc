@@ -35,48 +35,38 @@ std::int64_t day_of(std::int64_t utime_us) {
   return utime_us - ((utime_us % day_us + day_us) % day_us);
 }
 
-const std::string& mission_day_sql() {
+std::string mission_day_sql() {
   // The columns have the types of those that are summed.
-  static const std::string sql =
-      "CREATE TABLE mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
-      ") AS SELECT robot_id, start_utime_us, samples, samples, samples, samples, samples, gap_count, "
-      "gap_s, " +
-      columns_of<signals::Accounts>() +
-      " FROM mission WITH NO DATA; ALTER TABLE mission_day ADD PRIMARY KEY (robot_id, day_utime_us), ADD "
-      "FOREIGN KEY (robot_id) REFERENCES robot (robot_id); CREATE INDEX mission_day_by_day ON mission_day "
-      "(day_utime_us);\n";
-  return sql;
+  return "CREATE TABLE mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
+         ") AS SELECT robot_id, start_utime_us, samples, samples, samples, samples, samples, gap_count, "
+         "gap_s, " +
+         columns_of<signals::Accounts>() +
+         " FROM mission WITH NO DATA; ALTER TABLE mission_day ADD PRIMARY KEY (robot_id, day_utime_us), ADD "
+         "FOREIGN KEY (robot_id) REFERENCES robot (robot_id); CREATE INDEX mission_day_by_day ON mission_day "
+         "(day_utime_us);\n";
 }
 
-const std::string& totals_columns() {
-  static const std::string columns =
-      "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " +
-      columns_of<signals::Accounts>();
-  return columns;
+std::string totals_columns() {
+  return "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " +
+         columns_of<signals::Accounts>();
 }
 
-const std::string& totals_of_missions() {
-  static const std::string sums =
-      "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
-      "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
-      "coalesce(sum(gap_s), 0.0), " +
-      each(columns_of<signals::Accounts>(), "sum($)");
-  return sums;
+std::string totals_of_missions() {
+  return "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
+         "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
+         "coalesce(sum(gap_s), 0.0), " +
+         each(columns_of<signals::Accounts>(), "sum($)");
 }
 
-const std::string& totals_of_one() {
-  static const std::string values =
-      "1, CASE WHEN measured_s > 0 THEN 1 ELSE 0 END, incomplete, samples, gap_count, gap_s, " +
-      columns_of<signals::Accounts>();
-  return values;
+std::string totals_of_one() {
+  return "1, CASE WHEN measured_s > 0 THEN 1 ELSE 0 END, incomplete, samples, gap_count, gap_s, " +
+         columns_of<signals::Accounts>();
 }
 
-const std::string& totals_of_parts() {
-  static const std::string sums = each("missions, measured_missions, incomplete_missions, samples, gap_count",
-                                       "CAST(coalesce(sum($), 0) AS BIGINT)") +
-                                  ", coalesce(sum(gap_s), 0.0), " +
-                                  each(columns_of<signals::Accounts>(), "sum($)");
-  return sums;
+std::string totals_of_parts() {
+  return each("missions, measured_missions, incomplete_missions, samples, gap_count",
+              "CAST(coalesce(sum($), 0) AS BIGINT)") +
+         ", coalesce(sum(gap_s), 0.0), " + each(columns_of<signals::Accounts>(), "sum($)");
 }
 
 void ChangedDays::changed(std::string_view robot_id, std::int64_t start_utime_us) {

@@ -19,7 +19,7 @@ inline constexpr std::int64_t day_us = 86'400'000'000;
 std::int64_t day_of(std::int64_t utime_us);
 
 // Creates the table mission_day in a PostgreSQL.
-const std::string& mission_day_sql();
+std::string mission_day_sql();
 
 // SQL condition: the mission was not annulled. Annulled missions are excluded from all sums. In findings, as
 // annulled_findings() writes them, only the names of members have quotes without a backslash.
@@ -28,10 +28,10 @@ inline constexpr std::string_view not_annulled =
 
 // The SQL of Totals, each time comma-separated and in the order of Totals: the columns of mission_day; sums
 // over missions; the values of one mission; sums over rows of such columns.
-const std::string& totals_columns();
-const std::string& totals_of_missions();
-const std::string& totals_of_one();
-const std::string& totals_of_parts();
+std::string totals_columns();
+std::string totals_of_missions();
+std::string totals_of_one();
+std::string totals_of_parts();
 
 // The robots and days with missions that a transaction changes.
 class ChangedDays {

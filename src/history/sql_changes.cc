@@ -39,16 +39,15 @@ std::string places_sql(bool is_postgres, const std::string& which) {
          (is_postgres ? " FOR NO KEY UPDATE" : "");
 }
 
-const std::string& mission_content() {
-  static const std::string columns = columns_of<Mission>(mission_identity);
-  return columns;
+std::string mission_content() {
+  return columns_of<Mission>(mission_identity);
 }
 
 BulkRows bulk_checkpoints() {
   return {"mission", mission_content() + ", telemetry_samples, covariate_changes, mission_key",
           [](const std::string& from) {
             std::string values;
-            const std::string& all = mission_content();
+            const std::string all = mission_content();
             for (const std::string& column : column_names(all)) values += "new." + column + ", ";
             return "UPDATE mission SET (" + all + ", telemetry_samples, covariate_changes) = (" + values +
                    "mission.telemetry_samples + new.telemetry_samples, mission.covariate_changes + "

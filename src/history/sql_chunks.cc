@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <utility>
-#include <vector>
 
 #include "base/try.h"
 #include "history/chunk_codec.h"
@@ -112,9 +111,8 @@ std::string in_tail_sql() {
 
 }  // namespace
 
-const std::string& in_tails_sql() {
-  static const std::string sql = in_tail_sql<Sample>() + ", " + in_tail_sql<CovariateChange>();
-  return sql;
+std::string in_tails_sql() {
+  return in_tail_sql<Sample>() + ", " + in_tail_sql<CovariateChange>();
 }
 
 std::string telemetry_columns() {

@@ -28,7 +28,7 @@ struct End {
 std::string telemetry_columns();
 
 // How many samples and changes of a row of `mission` are in its tails: two columns.
-const std::string& in_tails_sql();
+std::string in_tails_sql();
 
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
 // ended. The mission's row counts them already. Answers how many are in the tail then.

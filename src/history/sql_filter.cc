@@ -44,18 +44,15 @@ std::string among(const std::string& column, std::size_t values) {
   return sql + ")";
 }
 
-const std::string& ratio_sql() {
-  static const std::string sql =
-      "(CASE WHEN measured_s > 0 AND measured_j - ledger_unexplained_j > 0 THEN measured_j / (measured_j - "
-      "ledger_unexplained_j) END)";
-  return sql;
+std::string ratio_sql() {
+  return "(CASE WHEN measured_s > 0 AND measured_j - ledger_unexplained_j > 0 THEN measured_j / (measured_j "
+         "- "
+         "ledger_unexplained_j) END)";
 }
 
-const std::string& wh_per_km_sql() {
-  static const std::string sql = "(CASE WHEN distance_m > " +
-                                 std::to_string(signals::least_compared_distance_m) +
-                                 " THEN battery_j / distance_m / 3.6 END)";
-  return sql;
+std::string wh_per_km_sql() {
+  return "(CASE WHEN distance_m > " + std::to_string(signals::least_compared_distance_m) +
+         " THEN battery_j / distance_m / 3.6 END)";
 }
 
 template <class Visit>

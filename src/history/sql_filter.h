@@ -14,8 +14,8 @@
 namespace joulecast::history {
 
 // signals::energy_ratio() and signals::energy_per_distance_wh_km().
-const std::string& ratio_sql();
-const std::string& wh_per_km_sql();
+std::string ratio_sql();
+std::string wh_per_km_sql();
 
 // A condition: the mission's telemetry is not contradicted. Nothing is drawn from such missions.
 inline constexpr std::string_view not_contradicted =

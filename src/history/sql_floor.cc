@@ -89,13 +89,12 @@ class Sums {
   std::unordered_map<std::uint64_t, std::size_t> places_;
 };
 
-const std::string& select_points() {
-  static const std::string sql =
-      "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, x_m, y_m "
-      "FROM trace WHERE " +
-      among("mission_key", missions_at_once) +
-      " AND x_m IS NOT NULL AND y_m IS NOT NULL ORDER BY mission_key";
-  return sql;
+std::string select_points() {
+  return "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, x_m, "
+         "y_m "
+         "FROM trace WHERE " +
+         among("mission_key", missions_at_once) +
+         " AND x_m IS NOT NULL AND y_m IS NOT NULL ORDER BY mission_key";
 }
 
 Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filter, std::int64_t max_points) {

@@ -37,14 +37,11 @@ Result<ModelVersion> read_model(Rows& rows) {
   return model;
 }
 
-const std::string& state_sql() {
-  static const std::string sql = [] {
-    std::string text = "(CASE state";
-    for (std::size_t k = 0; k < mission_state_count; ++k)
-      text += " WHEN '" + std::string(name(static_cast<MissionState>(k))) + "' THEN " + std::to_string(k);
-    return text + " END)";
-  }();
-  return sql;
+std::string state_sql() {
+  std::string text = "(CASE state";
+  for (std::size_t k = 0; k < mission_state_count; ++k)
+    text += " WHEN '" + std::string(name(static_cast<MissionState>(k))) + "' THEN " + std::to_string(k);
+  return text + " END)";
 }
 
 enum class Kind { integer, real, text };
