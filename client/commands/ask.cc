@@ -21,7 +21,7 @@
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
-#include "report/profile_drawing.h"
+#include "report/report.h"
 #include "robot/robot_file.h"
 
 // The commands profile, estimate and autonomy: answers for one robot, computed here from a robot file or by a

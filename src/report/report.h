@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/error.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::report {
@@ -20,5 +21,12 @@ struct ReportOrigin {
 // model that was diagnosed.
 std::string report_html(const nlohmann::ordered_json& diagnosis, const robot::RobotModel& robot,
                         const ReportOrigin& origin);
+
+// The motion of a profile or estimate, with its baselines, over time, as an SVG document: speed where one
+// drives, yaw rate where one turns, power and energy. Fault::corrupt where the answer has no columns.
+[[nodiscard]] Result<std::string> draw_answer(const nlohmann::json& answer);
+
+// Round values that span a range.
+std::vector<double> ticks_of(double low, double high, int about);
 
 }  // namespace joulecast::report

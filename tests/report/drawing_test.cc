@@ -4,7 +4,7 @@
 #include <stack>
 #include <string>
 
-#include "report/profile_drawing.h"
+#include "report/report.h"
 #include "tests/study/exploration/exploration_drawing.h"
 #include "tests/study/exploration/svg.h"
 

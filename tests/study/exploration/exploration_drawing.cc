@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "report/profile_drawing.h"
+#include "report/report.h"
 #include "tests/study/exploration/svg.h"
 
 namespace joulecast::report {
