@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string_view>
-#include <utility>
 
 #include "base/bounds.h"
 #include "base/nearest_word.h"

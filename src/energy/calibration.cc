@@ -15,7 +15,6 @@
 #include "energy/drive_equations.h"
 #include "energy/power_windows.h"
 #include "statistics/distributions.h"
-#include "telemetry/recording.h"
 #include "windows/windows.h"
 
 namespace joulecast::energy {

@@ -6,7 +6,6 @@
 
 #include "dynamics/parameters.h"
 #include "statistics/robust.h"
-#include "telemetry/recording.h"
 
 namespace joulecast::windows {
 namespace {
