@@ -1,4 +1,4 @@
-import { useEffect, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 export const sessionPath = '/v1/session';
 
@@ -76,6 +76,17 @@ export function query(values) {
 
 export const idPath = (id) => encodeURIComponent(id);
 
+// Calls `act`, as it was last drawn, every `ms`; never without `ms`.
+export function useEvery(ms, act) {
+  const latest = useRef();
+  latest.current = act;
+  useEffect(() => {
+    if (!ms) return undefined;
+    const timer = setInterval(() => latest.current(), ms);
+    return () => clearInterval(timer);
+  }, [ms]);
+}
+
 // {value, error, loading, path, reload}: what `read(signal)` resolves to. Reads again when `path` or
 // `renewed` changes and, if given, every `everyMs`; keeps the last value meanwhile, with its path. An empty
 // or null path reads nothing.
@@ -94,15 +105,23 @@ export function useRead(read, path, renewed, everyMs) {
     return () => abort.abort();
   }, [path, turn, renewed]);
   const reload = () => setTurn((n) => n + 1);
-  useEffect(() => {
-    if (!everyMs) return undefined;
-    const timer = setInterval(reload, everyMs);
-    return () => clearInterval(timer);
-  }, [everyMs]);
+  useEvery(everyMs, reload);
   return { ...state, reload };
 }
 
 export const useGet = (path, ...more) => useRead((signal) => get(path, signal), path, ...more);
+
+// What `read()` returns; drawn again when that changes with the event of `target`. A layout effect, so that a
+// change before the first paint is noticed.
+export function useSource(read, target, event = 'change') {
+  const [value, setValue] = useState(read);
+  useLayoutEffect(() => {
+    const change = () => setValue(read);
+    target.addEventListener(event, change);
+    return () => target.removeEventListener(event, change);
+  }, []);
+  return value;
+}
 
 const kept = new Map();
 

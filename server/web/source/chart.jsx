@@ -108,15 +108,11 @@ export const withGaps = (times, longest) =>
   times.flatMap((t, k) => (k > 0 && t - times[k - 1] > longest ? [(t + times[k - 1]) / 2, t] : [t]));
 
 // The last of sorted times at or before `at`, as an index; 0 without one.
-export function lastAt(times, at) {
-  let [low, high] = [0, times.length];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (times[middle] <= at) low = middle;
-    else high = middle;
-  }
-  return low;
-}
+export const lastAt = (times, at) =>
+  Math.max(
+    0,
+    times.findLastIndex((time) => time <= at),
+  );
 
 let uPlot = null;
 
@@ -130,6 +126,12 @@ export const bars = (width, start) => {
 
 // A series without marks of its points.
 export const line = (stroke, width = 1.5, more) => ({ stroke, width, points: { show: false }, ...more });
+
+// A series of marks without a line.
+export const dots = (stroke, size, width) => {
+  const points = { show: true, size, width, stroke, fill: stroke };
+  return { stroke: 'transparent', paths: () => null, points };
+};
 
 // Without other options: seconds along x, and no zoom.
 const usual = {
@@ -172,6 +174,4 @@ export function Chart({ make, data, height = 220, label, changes = [] }) {
   );
 }
 
-export function withAlpha(colour, share) {
-  return `color-mix(in srgb, ${colour} ${share * 100}%, transparent)`;
-}
+export const withAlpha = (colour, share) => `color-mix(in srgb, ${colour} ${share * 100}%, transparent)`;

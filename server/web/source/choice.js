@@ -1,9 +1,9 @@
 // A choice of the reader's, kept in the browser where storage is allowed, for this visit otherwise.
-import { useEffect, useState } from 'preact/hooks';
+import { useSource } from './api.js';
 
 export function keptChoice(name, values, fallback) {
   const key = `joulecast.${name}`;
-  const listeners = new Set();
+  const changes = new EventTarget();
   let chosen = null;
   try {
     chosen = localStorage.getItem(key);
@@ -12,11 +12,11 @@ export function keptChoice(name, values, fallback) {
   }
   if (!values.includes(chosen)) chosen = null;
   const get = () => chosen ?? fallback();
-  const tell = () => listeners.forEach((listener) => listener(get()));
+  const tell = () => changes.dispatchEvent(new Event('change'));
   return {
     get,
     tell,
-    listen: (listener) => listeners.add(listener),
+    listen: (listener) => changes.addEventListener('change', listener),
     set(value) {
       chosen = value;
       try {
@@ -27,13 +27,6 @@ export function keptChoice(name, values, fallback) {
       tell();
     },
     // A component that uses it is drawn again when the choice changes.
-    use() {
-      const [value, setValue] = useState(get);
-      useEffect(() => {
-        listeners.add(setValue);
-        return () => listeners.delete(setValue);
-      }, []);
-      return value;
-    },
+    use: () => useSource(get, changes),
   };
 }

@@ -7,11 +7,8 @@ import { Button } from './widgets.jsx';
 
 export function Dialog({ open, title, action, onSubmit, onClose, children, ...more }) {
   const dialog = useRef(null);
-  useEffect(() => {
-    if (open)
-      dialog.current.showModal(); // with its content, so that a control in it gets the focus
-    else dialog.current.close();
-  }, [open]);
+  // Shown with its content, so that a control in it gets the focus.
+  useEffect(() => dialog.current[open ? 'showModal' : 'close'](), [open]);
   const submit = (event) => {
     event.preventDefault();
     onSubmit(Object.fromEntries(new FormData(event.target)));

@@ -38,9 +38,16 @@ export function pathThrough(c, ...places) {
   c.beginPath();
   for (let k = 0; k < places.length; k += 2) c[k === 0 ? 'moveTo' : 'lineTo'](places[k], places[k + 1]);
 }
-export function strokeThrough(c, ...places) {
+export function strokeThrough(c, colour, width, ...places) {
+  c.strokeStyle = colour;
+  c.lineWidth = width;
   pathThrough(c, ...places);
   c.stroke();
+}
+export function strokeBox(c, colour, width, ...box) {
+  c.strokeStyle = colour;
+  c.lineWidth = width;
+  c.strokeRect(...box);
 }
 
 // The transformation from the floor to the canvas.
@@ -73,32 +80,29 @@ function niceLength(metre) {
 }
 
 function drawGrid(c, view) {
-  const p = palette();
+  const { graticule } = palette();
   const step = niceLength(90 / view.scale);
   const [left, top] = view.from(0, 0);
   const [right, bottom] = view.from(view.width, view.height);
-  c.strokeStyle = p.graticule;
-  c.lineWidth = 1;
   const sharp = (px) => Math.round(px) + 0.5;
   for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
     const px = sharp(view.to(x, 0)[0]);
-    strokeThrough(c, px, 0, px, view.height);
+    strokeThrough(c, graticule, 1, px, 0, px, view.height);
   }
   for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
     const py = sharp(view.to(0, y)[1]);
-    strokeThrough(c, 0, py, view.width, py);
+    strokeThrough(c, graticule, 1, 0, py, view.width, py);
   }
 }
 
 function drawScaleBar(c, view) {
-  const p = palette();
+  const { ink } = palette();
   const metre = niceLength(120 / view.scale);
   const long = metre * view.scale;
   const x = 14.5;
   const y = view.height - 14.5;
-  c.strokeStyle = c.fillStyle = p.ink;
-  c.lineWidth = 1.5;
-  strokeThrough(c, x, y - 5, x, y, x + long, y, x + long, y - 5);
+  strokeThrough(c, ink, 1.5, x, y - 5, x, y, x + long, y, x + long, y - 5);
+  c.fillStyle = ink;
   c.font = '12px "Liberation Sans", "Helvetica Neue", Arial, sans-serif';
   c.textAlign = 'left';
   c.textBaseline = 'alphabetic';
@@ -191,10 +195,8 @@ function drawEnds(c, view, points) {
 }
 
 function drawUnder(c, view, points) {
-  c.strokeStyle = palette().muted;
-  c.lineWidth = 1.25;
   c.setLineDash([5, 4]);
-  strokeThrough(c, ...points.flatMap(([x, y]) => view.to(x, y)));
+  strokeThrough(c, palette().muted, 1.25, ...points.flatMap(([x, y]) => view.to(x, y)));
   c.setLineDash([]);
 }
 
@@ -221,14 +223,9 @@ export function drawZones(c, view, zones) {
     const percent = Math.round(100 * zone.departure);
     const more = Number.isFinite(percent) ? `, ${percent > 0 ? '+' : ''}${percent} %` : '';
     const text = `Zone ${k + 1}${more}`;
-    for (const [colour, width] of [
-      [p.screen, 4],
-      [p.gap, 2],
-    ]) {
-      c.strokeStyle = colour;
-      c.lineWidth = width;
-      c.strokeRect(left - 2, top - 2, right - left + 4, bottom - top + 4);
-    }
+    const box = [left - 2, top - 2, right - left + 4, bottom - top + 4];
+    strokeBox(c, p.screen, 4, ...box);
+    strokeBox(c, p.gap, 2, ...box);
     drawText(c, view, text, left, Math.max(top - 10, 10), p.gap);
   });
 }
@@ -240,17 +237,9 @@ export const powerAt = ({ measured_power_w: measured, modelled_power_w: modelled
 // Rows [x m, y m, value(k)] of a trace.
 export const rowsOf = ({ x_m: x, y_m: y }, value) => x.map((m, k) => [m ?? NaN, y[k] ?? NaN, value?.(k)]);
 
-// `points`: rows [x m, y m, value]. `cursor`: the marked row, or null. `under`: a path drawn dashed below it.
-export function FloorPath({
-  points,
-  kind = 'power',
-  height = 380,
-  label,
-  cursor,
-  robot,
-  ends = true,
-  under,
-}) {
+// `points`: rows [x m, y m, value]. `cursor`: the marked row, or null. `robot`: [x m, y m, heading] of
+// the robot, in place of marks of the ends. `under`: a path drawn dashed below it.
+export function FloorPath({ points, kind = 'power', height = 380, label, cursor, robot, under }) {
   const shown = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
   useTheme(); // the scale is of the theme
   const values = shown.map((row) => row[2]);
@@ -259,33 +248,25 @@ export function FloorPath({
     fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
   const draw = (c, view) => {
     if (under) drawUnder(c, view, under);
-    c.lineWidth = 3.2;
     c.lineCap = 'round';
     c.lineJoin = 'round';
     for (let k = 1; k < shown.length; ++k) {
-      c.strokeStyle = Number.isFinite(values[k]) ? scale.colourOf(values[k]) : palette().line;
-      strokeThrough(c, ...view.to(...shown[k - 1]), ...view.to(...shown[k]));
+      const colour = Number.isFinite(values[k]) ? scale.colourOf(values[k]) : palette().line;
+      strokeThrough(c, colour, 3.2, ...view.to(...shown[k - 1]), ...view.to(...shown[k]));
     }
-    if (shown.length > 1 && ends) drawEnds(c, view, shown);
-    if (robot) {
-      const [x, y, heading] = robot;
-      drawRobot(c, view, x, y, heading ?? 0, palette().ink);
-    }
+    if (robot) drawRobot(c, view, ...robot, palette().ink);
+    else if (shown.length > 1) drawEnds(c, view, shown);
     const at = points[cursor];
     if (at && Number.isFinite(at[0])) {
       const [px, py] = view.to(at[0], at[1]);
-      c.strokeStyle = palette().ink;
-      c.lineWidth = 1;
-      strokeThrough(c, px, 0, px, view.height);
-      strokeThrough(c, 0, py, view.width, py);
+      strokeThrough(c, palette().ink, 1, px, 0, px, view.height);
+      strokeThrough(c, palette().ink, 1, 0, py, view.width, py);
       drawDot(c, [px, py], 6, palette().accent);
     }
   };
   return (
     <FloorView
-      viewFor={viewFor}
-      draw={draw}
-      height={height}
+      {...{ viewFor, draw, height }}
       aria-label={label}
       changes={[points, kind, cursor, robot, under]}
     >

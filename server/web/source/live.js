@@ -1,7 +1,6 @@
 // The live fleet: the list once, then the event stream. Events change the map immediately; components are
 // notified at most once per animation frame and five times per second, for any number of robots.
-import { useEffect, useState } from 'preact/hooks';
-import { get, onUnauthorized, query } from './api.js';
+import { get, onUnauthorized, query, useSource } from './api.js';
 
 const powerSamples = 90;
 const pathSamples = 600;
@@ -37,7 +36,7 @@ const state = {
   robots,
   revision: 0,
 };
-const listeners = new Set();
+const changes = new EventTarget();
 let source = null;
 let drawnMs = 0;
 let scheduled = false;
@@ -49,7 +48,7 @@ function tell() {
   scheduled = false;
   drawnMs = performance.now();
   state.revision += 1;
-  for (const listener of listeners) listener(state.revision);
+  changes.dispatchEvent(new Event('change'));
 }
 
 function changed() {
@@ -192,12 +191,7 @@ export function startLive() {
 }
 
 export function useLive() {
-  const [, setRevision] = useState(0);
-  useEffect(() => {
-    listeners.add(setRevision);
-    setRevision(state.revision);
-    return () => listeners.delete(setRevision);
-  }, []);
+  useSource(() => state.revision, changes);
   return state;
 }
 

@@ -1,6 +1,6 @@
 import { render } from 'preact';
-import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
-import { askToSignIn, useGet, useRead } from './api.js';
+import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { askToSignIn, useGet, useRead, useSource } from './api.js';
 import { SignIn } from './dialog.jsx';
 import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
 import { clock } from './format.js';
@@ -99,18 +99,13 @@ function OfflineBanner() {
 }
 
 function App() {
-  const [route, setRoute] = useState(routeOf(location.hash));
+  const hash = useSource(() => location.hash, globalThis, 'hashchange');
+  const route = useMemo(() => routeOf(hash), [hash]);
   const main = useRef(null);
   const first = useRef(true);
   const dark = useTheme();
   const unit = useEnergyUnit();
   const clustered = useGet('/v1/cluster').value?.name;
-  // A layout effect, so that a change of the address before the first paint is noticed.
-  useLayoutEffect(() => {
-    const change = () => setRoute(routeOf(location.hash));
-    addEventListener('hashchange', change);
-    return () => removeEventListener('hashchange', change);
-  }, []);
   useEffect(() => {
     if (first.current) first.current = false;
     else {

@@ -3,7 +3,7 @@ import { render } from 'preact';
 import './style.css';
 import './views/views.css';
 import * as format from './format.js';
-import { Heading, Panel, Texts, useTitleOf } from './widgets.jsx';
+import { Heading, TextPanel, useTitleOf } from './widgets.jsx';
 import { Result } from './views/diagnosis.jsx';
 import { effectName } from './views/jobs.jsx';
 
@@ -41,9 +41,7 @@ function Report() {
     <main>
       <Heading title={title} />
       <Result result={result}>{result.adoption?.effects.length > 0 && <Offer of={result.adoption} />}</Result>
-      <Panel title="Origin of the data">
-        <Texts of={originLines} />
-      </Panel>
+      <TextPanel title="Origin of the data" of={originLines} />
     </main>
   );
 }

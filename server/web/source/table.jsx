@@ -7,8 +7,8 @@ const absent = (v) => v === null || v === undefined;
 const compare = (a, b) => (typeof a === 'string' ? names.compare(a, b) : a - b);
 
 // A copy of `rows` in the order of the column `sort.key`; rows without a value come last in both directions.
-export function sorted(rows, columns, sort) {
-  const value = columns.find((c) => c.key === sort?.key)?.sort;
+export function sorted(rows, columns, [sort]) {
+  const value = columns.find((c) => c.key === sort.key)?.sort;
   if (value === undefined) return rows;
   return [...rows].sort((one, other) => {
     const [a, b] = [value(one), value(other)];
@@ -27,7 +27,7 @@ export function orderOf(given, change, usual) {
   return [sort, onSort];
 }
 
-export function Head({ columns, sort, onSort }) {
+export function Head({ columns, order: [sort, onSort] = [] }) {
   const direction = (c) => (c.key !== sort?.key ? undefined : sort.down ? 'descending' : 'ascending');
   return (
     <thead>
@@ -59,7 +59,7 @@ export function Head({ columns, sort, onSort }) {
 }
 
 // The choice of a table's order on narrow screens, which do not show the column titles.
-export function SortChoice({ columns, sort, onSort }) {
+export function SortChoice({ columns, order: [sort, onSort] }) {
   const sortable = columns.filter((c) => c.sort).map((c) => [c.key, c.title]);
   return (
     <span class="sort-choice">
@@ -94,16 +94,16 @@ export const Cells = ({ columns, row }) =>
   );
 
 // columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by};
-// `onSort(key)`: of a table that can be sorted.
-export function Table({ columns, rows, keyOf, sort, onSort, class: name = '' }) {
+// `order`, of orderOf(): of a table that can be sorted. Rows are identified by key, id or robot_id, if any.
+export function Table({ columns, rows, order, class: name = '' }) {
   return (
     <>
-      {onSort && <SortChoice columns={columns} sort={sort} onSort={onSort} />}
+      {order && <SortChoice columns={columns} order={order} />}
       <table class={`grid cards ${name}`}>
-        <Head columns={columns} sort={sort} onSort={onSort} />
+        <Head columns={columns} order={order} />
         <tbody>
           {rows.map((row, k) => (
-            <tr key={keyOf ? keyOf(row) : k}>
+            <tr key={row.key ?? row.id ?? row.robot_id ?? k}>
               <Cells columns={columns} row={row} />
             </tr>
           ))}
@@ -113,9 +113,11 @@ export function Table({ columns, rows, keyOf, sort, onSort, class: name = '' }) 
   );
 }
 
-export const TablePanel = ({ title, aside, note, ...table }) => (
-  <Panel title={title} aside={aside}>
-    <Table {...table} />
-    {note && <p class="note foot">{note}</p>}
-  </Panel>
-);
+// Nothing without rows.
+export const TablePanel = ({ title, aside, note, ...table }) =>
+  table.rows?.length > 0 && (
+    <Panel title={title} aside={aside}>
+      <Table {...table} />
+      {note && <p class="note foot">{note}</p>}
+    </Panel>
+  );

@@ -5,8 +5,8 @@ const choice = keptChoice('theme', ['light', 'dark'], () => (systemDark.matches 
 const { style } = document.documentElement;
 let colours = null;
 
-function show(theme) {
-  style.colorScheme = theme;
+function show() {
+  style.colorScheme = choice.get();
   colours = null;
 }
 
@@ -29,4 +29,4 @@ export const palette = () => (colours ??= Object.fromEntries(names.map((name) =>
 
 choice.listen(show); // before any component's, so that they find the new colours
 systemDark.addEventListener('change', choice.tell);
-show(choice.get());
+show();

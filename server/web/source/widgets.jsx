@@ -1,5 +1,5 @@
-import { useEffect, useErrorBoundary, useMemo, useState } from 'preact/hooks';
-import { askToSignIn } from './api.js';
+import { useErrorBoundary, useMemo } from 'preact/hooks';
+import { askToSignIn, useSource } from './api.js';
 import * as format from './format.js';
 import { refusalFor } from './session.js';
 
@@ -94,32 +94,38 @@ export function Failure({ error, retry }) {
   );
 }
 
-// The result of useGet: its value through `children`, or the error; `missing` where there is no such thing.
-export function Answer({ of, what, missing, children }) {
-  if (of.value !== null) return children(of.value);
+// The result of useGet: the part `from(value)` of its value through `children`, or the error; `missing` where
+// there is no such thing, `none`, with `more`, where the part is an empty list.
+export function Answer({ of, what, missing, from = (value) => value, none, more, children }) {
+  if (of.value !== null) {
+    const part = from(of.value);
+    return none && part.length === 0 ? <Empty title={none}>{more}</Empty> : children(part);
+  }
   if (missing && [400, 404].includes(of.error?.status)) return missing;
   if (of.error !== null) return <Failure error={of.error} retry={of.reload} />;
   return <Loading what={what} />;
 }
 
-// The list `from(value)` of a result of useGet, or `none`, with `more`, where it is empty.
-export const List = ({ of, what, from = (value) => value, none, more, children }) => (
-  <Answer of={of} what={what}>
-    {(value) => (from(value).length === 0 ? <Empty title={none}>{more}</Empty> : children(from(value)))}
-  </Answer>
-);
-
-export function Panel({ title, aside, children, class: name }) {
+// With `of`, a result of useGet, its content is that of an Answer.
+export function Panel({ title, aside, children, class: name, of, ...answer }) {
   return (
     <section class={`panel ${name ?? ''}`}>
       <header class="row wrap">
         <h2>{title}</h2>
         {aside && <div class="row aside">{aside}</div>}
       </header>
-      {children}
+      {of ? <Answer {...{ of, children, ...answer }} /> : children}
     </section>
   );
 }
+
+// Texts as a list in a panel; nothing without texts.
+export const TextPanel = ({ title, of }) =>
+  of?.length > 0 && (
+    <Panel title={title}>
+      <Texts of={of} />
+    </Panel>
+  );
 
 // The head of a view: its title, with links above it and a note and other content next to it.
 export const Heading = ({ title, crumbs, note, children }) => (
@@ -183,12 +189,4 @@ export function useTitleOf(text) {
 const narrowScreen = matchMedia('(max-width: 900px)');
 
 // Whether rows are drawn as cards; the style sheet has the same width.
-export function useNarrow() {
-  const [narrow, setNarrow] = useState(narrowScreen.matches);
-  useEffect(() => {
-    const change = () => setNarrow(narrowScreen.matches);
-    narrowScreen.addEventListener('change', change);
-    return () => narrowScreen.removeEventListener('change', change);
-  }, []);
-  return narrow;
-}
+export const useNarrow = () => useSource(() => narrowScreen.matches, narrowScreen);

@@ -21,24 +21,21 @@ function TestTable({ missions }) {
   const errors = missions.flatMap((m) => [Math.abs(m.before.relative), Math.abs(m.after.relative)]);
   const most = Math.max(0.01, ...errors);
   const scale = energyScale(missions.map((m) => m.measured_j));
-  const error = (key, title) =>
-    figure(key, title, (m) => (
-      <span title={`95 % interval ${rangeOf(m[key].ci)}`}>{format.signed(share(m[key].relative))}</span>
-    ));
-  const bar = (key, kind) =>
-    column(
-      `${key}-bar`,
-      '',
-      (m) => <Strips of={[[Math.max(0.005, Math.abs(m[key].relative) / most), kind]]} tallPx={12} />,
-      { class: 'wide bar-cell' },
-    );
+  const errorOf = ({ ci, relative }) => (
+    <span title={`95 % interval ${rangeOf(ci)}`}>{format.signed(share(relative))}</span>
+  );
+  const barOf = ({ relative }, kind) => (
+    <Strips of={[[Math.max(0.005, Math.abs(relative) / most), kind]]} tallPx={12} />
+  );
+  const side = (key, title, kind) => [
+    figure(key, title, (m) => errorOf(m[key])),
+    column(`${key}-bar`, '', (m) => barOf(m[key], kind), { class: 'wide bar-cell' }),
+  ];
   const columns = [
     column('mission', 'Mission', missionCell, { head: true }),
     figure('measured', 'Measured', (m) => energyIn(scale, m.measured_j)),
-    error('before', 'Error before'),
-    bar('before', 'plain'),
-    error('after', 'Error after'),
-    bar('after', 'modelled'),
+    ...side('before', 'Error before', 'plain'),
+    ...side('after', 'Error after', 'modelled'),
   ];
   return <Table class="test" columns={columns} rows={missions} />;
 }
@@ -131,12 +128,14 @@ function optionsOf({ id: first, instead }) {
 function changesFor(job, robot, chosen) {
   if (chosen.length === 0) return changesOf(job.model, robot?.model);
   const all = job.result.adoption.effects.flatMap((e) => [e, ...e.instead]);
-  return chosen
-    .map((id) => all.find((e) => e.id === id))
-    .flatMap((e) =>
-      Object.entries(e?.parameters ?? {}).map(([name, value]) => [`effects.${e.id}.${name}`, value]),
-    )
-    .map(([key, value]) => ({ key, from: null, to: format.digits(value, 4) }));
+  const rowOf = (id, [name, value]) => ({
+    key: `effects.${id}.${name}`,
+    from: null,
+    to: format.digits(value, 4),
+  });
+  return chosen.flatMap((id) =>
+    Object.entries(all.find((e) => e.id === id)?.parameters ?? {}).map((parameter) => rowOf(id, parameter)),
+  );
 }
 
 export function Adopt({ job }) {

@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { useNewest } from '../logs.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
-import { Button, Choice, Heading, List } from '../widgets.jsx';
+import { Answer, Button, Choice, Heading } from '../widgets.jsx';
 import { RobotField, TextField } from './choosing.jsx';
 import { verdictTitle } from './jobs.jsx';
 
@@ -104,7 +104,7 @@ const eventColumns = [
 
 export function Events({ events, withRobot = true }) {
   const shown = eventColumns.filter(({ key }) => withRobot || key !== 'robot');
-  return <Table class="events" columns={shown} rows={events} keyOf={(e) => e.id} />;
+  return <Table class="events" columns={shown} rows={events} />;
 }
 
 // As useNewest(): of a robot, or of all.
@@ -160,11 +160,11 @@ const columns = [
   column('detail', 'Request', requestCell, { class: 'words' }),
 ];
 
-// A log, of useNewest(), below its fields, as a List.
+// A log, of useNewest(), below its fields, as an Answer.
 const Log = ({ of, fields, ...list }) => (
   <>
     <div class="wrap filters">{fields}</div>
-    <List of={of} {...list} />
+    <Answer of={of} {...list} />
     {of.value?.next && (
       <p class="fold">
         <Button onClick={of.more}>Show older entries</Button>
@@ -189,7 +189,7 @@ function Requests() {
       none={text ? 'No request matches' : 'No request yet'}
       more="Requests that change something, refusals and sign-ins are listed here."
     >
-      {(rows) => <Table class="events" columns={columns} rows={rows} keyOf={(e) => e.key} />}
+      {(rows) => <Table class="events" columns={columns} rows={rows} />}
     </Log>
   );
 }

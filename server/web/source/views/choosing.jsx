@@ -117,6 +117,9 @@ export function fieldsOf(given, change) {
   };
 }
 
+// The attributes of a field with the name of a map or a level.
+export const placeName = { maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
+
 // The fields of a view, folded on a narrow screen.
 export function Filters({ label, children }) {
   const form = (

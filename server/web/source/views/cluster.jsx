@@ -85,8 +85,9 @@ const ownFacts = [
   ['memberships_lost', 'Absences longer than the lease'],
 ];
 
-function Shown({ of, live }) {
-  const [sort, onSort] = orderOf(...useChoices({}), { key: 'robot', down: false });
+function Shown({ of }) {
+  const live = useLive();
+  const order = orderOf(...useChoices({}), { key: 'robot', down: false });
   const leases = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
   return (
     <>
@@ -108,10 +109,8 @@ function Shown({ of, live }) {
             <Table
               class="leases"
               columns={leaseColumns}
-              rows={sorted(leases, leaseColumns, sort)}
-              keyOf={(l) => l.robot_id}
-              sort={sort}
-              onSort={onSort}
+              rows={sorted(leases, leaseColumns, order)}
+              order={order}
             />
           )}
         </Panel>
@@ -124,7 +123,6 @@ function Shown({ of, live }) {
 }
 
 export function Cluster() {
-  const live = useLive();
   const cluster = useGet('/v1/cluster', 0, renewMs);
   return (
     <>
@@ -139,7 +137,7 @@ export function Cluster() {
               To make it a member of one, set <code>cluster.name</code>.
             </Empty>
           ) : (
-            <Shown of={value} live={live} />
+            <Shown of={value} />
           )
         }
       </Answer>

@@ -6,7 +6,7 @@ import { strokeThrough } from '../floor.jsx';
 import * as format from '../format.js';
 import { Table, TablePanel, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
-import { Choice, Empty, Key, Panel, Readouts, Texts } from '../widgets.jsx';
+import { Choice, Empty, Key, Panel, Readouts, TextPanel, Texts } from '../widgets.jsx';
 import { unitOf } from './changes.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdictTitle } from './jobs.jsx';
@@ -20,23 +20,16 @@ const rowsOf = (columns) =>
     Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values[k]])),
   );
 
-const Colours = ({ measured, after }) => (
-  <p class="note foot">
-    <Key
-      of={{ measured: measured && 'measured', gap: 'robot file', modelled: after && 'with the effects' }}
-    />
-  </p>
-);
+const coloursOf = (after) => ({ gap: 'robot file', modelled: after && 'with the effects' });
 
 // The 95 % intervals of the first series.
 function drawWhiskers(u, half, shift) {
-  const c = u.ctx;
-  c.strokeStyle = palette().ink;
-  c.lineWidth = 1.5 * devicePixelRatio;
+  const width = 1.5 * devicePixelRatio;
+  const y = (value) => u.valToPos(value, 'y', true);
   half.forEach((w, k) => {
     if (!format.known(w)) return;
     const x = u.valToPos(u.data[0][k] + shift, 'x', true);
-    strokeThrough(c, x, u.valToPos(u.data[1][k] - w, 'y', true), x, u.valToPos(u.data[1][k] + w, 'y', true));
+    strokeThrough(u.ctx, palette().ink, width, x, y(u.data[1][k] - w), x, y(u.data[1][k] + w));
   });
 }
 
@@ -148,7 +141,9 @@ function PowerFigure({ power, after }) {
         changes={[after]}
         label={`Measured and modelled power of mission ${power.mission_id}`}
       />
-      <Colours measured after={after} />
+      <p class="note foot">
+        <Key of={{ measured: 'measured', ...coloursOf(after) }} />
+      </p>
       <p class="note foot">The part of mission {power.mission_id} with the largest gap.</p>
     </Panel>
   );
@@ -174,13 +169,10 @@ const groupColumns = [
   figure('energy', 'Measured, J/m', (g) => format.digits(g.energy_per_m_j)),
   figure('model', 'Modelled, J/m', (g) => format.digits(g.model_per_m_j)),
 ];
+const suffix = (unit) => (unit === '1' ? '' : ` ${unit}`);
 const strengthColumns = [
   column('group', 'Group', ([name]) => name, { head: true }),
-  figure(
-    'value',
-    'Above the weakest',
-    ([, g, unit]) => `${format.withDeviation(g.value, g.sd)}${unit === '1' ? '' : ` ${unit}`}`,
-  ),
+  figure('value', 'Above the weakest', ([, g, unit]) => format.withDeviation(g.value, g.sd) + suffix(unit)),
   figure('energy', 'Energy, J/m', ([, g]) => perMetre(g.energy_per_m_j)),
 ];
 const partColumns = [
@@ -199,13 +191,11 @@ function Comparison({ of: c }) {
   return (
     <>
       <TablePanel title="Groups" columns={groupColumns} rows={c.groups} />
-      {d && (
-        <TablePanel
-          title={`Energy per metre of ${d.to} above ${d.from}`}
-          columns={partColumns}
-          rows={parts}
-        />
-      )}
+      <TablePanel
+        title={`Energy per metre of ${d?.to} above ${d?.from}`}
+        columns={partColumns}
+        rows={parts}
+      />
       {c.strengths.map((s) => (
         <TablePanel
           key={s.id}
@@ -243,19 +233,16 @@ function strength(effect, name, { value, sd, unit }) {
     const percent = slope ? ` (${format.digits(100 * Math.tan(value), 2)} % slope)` : '';
     return `${scaled(format.degrees(1))}${unit === 'rad' ? '°' : '°/s'}${percent}`;
   }
-  return `${scaled(1)}${unit === '1' ? '' : ` ${unit}`}`;
+  return scaled(1) + suffix(unit);
 }
 
 // The lines of an effect's parameters; a place is one line.
 function strengths({ id, parameters: all }) {
-  const place = all.x_m && all.y_m;
-  const lines = Object.entries(all)
-    .filter(
-      ([name, p]) =>
-        (p.value !== 0 || p.sd > 0 || name === 'side') && !(place && ['x_m', 'y_m'].includes(name)),
-    )
+  const { x_m: x, y_m: y, ...others } = all;
+  const lines = Object.entries(x && y ? others : all)
+    .filter(([name, p]) => p.value !== 0 || p.sd > 0 || name === 'side')
     .map(([name, p]) => [name === 'ratio' ? 'by' : unitOf(name)[0], strength(id, name, p)]);
-  if (place) lines.push(['centre', `(${format.digits(all.x_m.value)}, ${format.digits(all.y_m.value)}) m`]);
+  if (x && y) lines.push(['centre', `(${format.digits(x.value)}, ${format.digits(y.value)}) m`]);
   return lines.map(([name, text]) => (
     <div key={name}>
       <span class="note">{name}</span> {text}
@@ -460,7 +447,9 @@ function Charts({ result: r }) {
               <ConditionChart key={map.axis} map={map} after={after} />
             ))}
           </div>
-          <Colours after={after} />
+          <p class="note foot">
+            <Key of={coloursOf(after)} />
+          </p>
           <p class="note foot">
             Above zero the robot consumes more than its model. Lines: 95 % intervals of the robot file.
           </p>
@@ -504,26 +493,21 @@ export function Result({ result: r, children }) {
   const placed = r.effects.some((e) => e.parameters.x_m); // its map comes first
   return (
     <>
-      {r.checks?.length > 0 && (
-        <Panel title="Checks of the recordings">
-          <Texts of={r.checks.map((c) => (c.contradicted ? `${c.says} It is not used below.` : c.says))} />
-        </Panel>
-      )}
+      <TextPanel
+        title="Checks of the recordings"
+        of={r.checks?.map((c) => (c.contradicted ? `${c.says} It is not used below.` : c.says))}
+      />
       <Verdict result={r} />
       <Figures result={r} />
-      {r.effects.length > 0 && (
-        <TablePanel title="Effects" class="effects" columns={effectColumns} rows={r.effects} />
-      )}
+      <TablePanel title="Effects" class="effects" columns={effectColumns} rows={r.effects} />
       {placed && floorOf(r)}
       {children && <Panel title="Adopt">{children}</Panel>}
-      {r.corrections?.length > 0 && (
-        <TablePanel
-          title="Values of the robot file that fit"
-          class="effects"
-          columns={correctionColumns}
-          rows={r.corrections}
-        />
-      )}
+      <TablePanel
+        title="Values of the robot file that fit"
+        class="effects"
+        columns={correctionColumns}
+        rows={r.corrections}
+      />
       {r.verdict !== 'none' && (
         <div class="columns">
           <Panel title="Where the gap arises">
@@ -538,14 +522,12 @@ export function Result({ result: r, children }) {
         </div>
       )}
       {r.groups && <Comparison of={r} />}
-      {r.runs && (
-        <TablePanel
-          title="Runs"
-          columns={runColumns}
-          rows={r.runs}
-          note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
-        />
-      )}
+      <TablePanel
+        title="Runs"
+        columns={runColumns}
+        rows={r.runs}
+        note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter?.run)}.`}
+      />
       {r.figures && <Charts result={r} />}
       {!placed && floorOf(r)}
       {readings.length > 0 && (
@@ -553,11 +535,7 @@ export function Result({ result: r, children }) {
           <Bars rows={readings} />
         </Panel>
       )}
-      {limits.length > 0 && (
-        <Panel title="Limits">
-          <Texts of={limits} />
-        </Panel>
-      )}
+      <TextPanel title="Limits" of={limits} />
     </>
   );
 }

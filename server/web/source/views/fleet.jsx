@@ -62,19 +62,14 @@ const Mission = ({ id, state: { mission, live } }) =>
     <span class="note">{live ? 'idle' : '–'}</span>
   );
 
+const Attention = ({ state, needs }) => <health.Health state={state} reasons={needs?.reasons} />;
+
 const hint = 'measured energy over modelled energy, median of the newest missions';
 
 // Of rows {id, state, needs, ratio, entry, scale}.
 const columns = [
   ['robot', '11%', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
-  [
-    'health',
-    '',
-    'Attention',
-    '',
-    (r) => <health.Health state={r.state} reasons={r.needs?.reasons} />,
-    urgency,
-  ],
+  ['health', '', 'Attention', '', Attention, urgency],
   ['power', '96px', 'Power', 'figure', Power, (r) => health.powerNow(r.state)],
   ['spark', '148px', 'Last 90 s', '', ({ entry }) => <health.Sparkline track={entry.power} />],
   ['charge', '116px', 'Charge', '', health.Charge, (r) => r.state.state_of_charge],
@@ -84,14 +79,10 @@ const columns = [
   ['ratio', '88px', 'Ratio', 'figure', (r) => <Ratio value={r.ratio ?? null} />, (r) => r.ratio, { hint }],
   ['mission', '16%', 'Mission', '', Mission, (r) => r.state.mission?.start_utime_us],
   ['spent', '88px', 'Energy', 'figure', (r) => energyIn(r.scale, spentOf(r)), spentOf],
-].map(([key, width, title, kind, cell, sort, more]) =>
-  column(key, title, cell, {
-    class: `${kind} ${key === 'ratio' ? 'ratio-cell' : key}`,
-    width,
-    sort,
-    ...more,
-  }),
-);
+].map(([key, width, title, kind, cell, sort, more]) => {
+  const own = key === 'ratio' ? 'ratio-cell' : key;
+  return column(key, title, cell, { class: `${kind} ${own}`, width, sort, ...more });
+});
 
 const filters = {
   all: ['All', () => true],
@@ -100,10 +91,7 @@ const filters = {
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
   charging: ['Charging', (s) => s.charging !== null],
-  low: [
-    `Charge below ${100 * health.lowCharge}\u00a0%`,
-    (s) => s.state_of_charge !== null && s.state_of_charge < health.lowCharge,
-  ],
+  low: [`Charge below ${100 * health.lowCharge}\u00a0%`, (s) => (s.state_of_charge ?? 1) < health.lowCharge],
 };
 const filterNames = Object.fromEntries(Object.entries(filters).map(([key, [name]]) => [key, name]));
 
@@ -127,18 +115,11 @@ function chosen(robots, text, keep, attention) {
 }
 
 // The rows in their order, which is renewed only every few seconds, since live values change all the time.
-function useOrder(live, text, only, sort, attention, ratios) {
+function useOrder(live, text, only, order, attention, ratios) {
   const kept = useRef({ key: '', at: -Infinity, rows: [] });
-  const key = [
-    text,
-    only,
-    sort.key,
-    sort.down,
-    live.robots.size,
-    live.loads,
-    [...attention.values()].map((e) => `${e.robot_id}${e.severity}${e.acknowledged}`).join(),
-    ratios.size,
-  ].join('|');
+  const urgencies = [...attention.values()].map((e) => `${e.robot_id}${e.severity}${e.acknowledged}`);
+  const [{ key: by, down }] = order;
+  const key = [text, only, by, down, live.robots.size, live.loads, urgencies, ratios.size].join('|');
   const at = performance.now();
   const held = document.activeElement?.closest('.fleet tbody'); // a row that moves loses the focus
   if (kept.current.key !== key || (at - kept.current.at > reorderMs && !held)) {
@@ -146,7 +127,7 @@ function useOrder(live, text, only, sort, attention, ratios) {
     const rows = chosen(live.robots, text, keep, attention)
       .sort((a, b) => names.compare(a.id, b.id))
       .map((entry) => ({ ...entry, entry, needs: attention.get(entry.id), ratio: ratios.get(entry.id) }));
-    const ordered = sorted(rows, columns, sort);
+    const ordered = sorted(rows, columns, order);
     // Robots without telemetry come last in every order.
     const heard = (wanted) => ordered.filter((r) => health.unheard(r.state) !== wanted);
     kept.current = { key, at, rows: [...heard(true), ...heard(false)].map((r) => r.entry) };
@@ -239,23 +220,21 @@ function Summary({ robots, attention }) {
   return <Readouts large rows={rows} />;
 }
 
-function Spacer({ rows, heightPx }) {
-  if (rows <= 0) return null;
-  return (
+const Spacer = ({ rows, heightPx }) =>
+  rows > 0 && (
     <tr aria-hidden="true" class="spacer">
       <td colspan={columns.length} style={{ height: `${rows * heightPx}px` }} />
     </tr>
   );
-}
 
-function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
+function RobotTable({ live, shown, order, attention, ratios }) {
   const heightPx = useNarrow() ? cardPx : rowPx;
   const [body, first, last] = useWindow(shown.length, heightPx);
   const scale = energyScale([...live.robots.values()].map(({ state }) => state.mission?.energy.battery_j));
   useEffect(() => showRecent(shown.slice(first, last)), [shown, first, last]);
   return (
     <table class="grid fleet" aria-rowcount={shown.length + 1}>
-      <Head columns={columns} sort={sort} onSort={onSort} />
+      <Head columns={columns} order={order} />
       <tbody ref={body}>
         <Spacer key="above" rows={first} heightPx={heightPx} />
         {shown.slice(first, last).map((entry, k) => (
@@ -284,12 +263,12 @@ export function Fleet({ given: asked }) {
   const { find: text = '' } = given;
   const only = given.show in filters ? given.show : 'all';
   const known = columns.some((c) => c.key === given.sort); // an address may name another column
-  const [sort, onSort] = orderOf(known ? given : {}, change, { key: 'health', down: false });
+  const order = orderOf(known ? given : {}, change, { key: 'health', down: false });
   const [whole, setWhole] = useState(false);
   const ratios = useRatios(useModelled());
   const quiet = [...live.robots.values()].filter((entry) => health.unheard(entry.state)).length;
   const foldable = only === 'all' && text === '' && quiet > 0 && quiet < live.robots.size;
-  const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort, attention, ratios);
+  const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, order, attention, ratios);
   if (!live.loaded && live.robots.size === 0)
     return live.error !== null ? <Failure error={live.error} /> : <Loading what="the fleet" />;
   if (live.robots.size === 0)
@@ -323,20 +302,13 @@ export function Fleet({ given: asked }) {
           onChange={(show) => change({ show: show === 'all' ? '' : show })}
           options={filterNames}
         />
-        <SortChoice columns={columns} sort={sort} onSort={onSort} />
+        <SortChoice columns={columns} order={order} />
         <Button href="#/robot-file">Add a robot</Button>
         <span class="row note key">
           <Key of={{ measured: 'measured', modelled: 'modelled' }} />
         </span>
       </div>
-      <RobotTable
-        live={live}
-        shown={rows}
-        sort={sort}
-        onSort={onSort}
-        attention={attention}
-        ratios={ratios}
-      />
+      <RobotTable live={live} shown={rows} order={order} attention={attention} ratios={ratios} />
       {rows.length === 0 && <Empty title="No robot matches" />}
       {foldable && (
         <p class="fold">

@@ -1,5 +1,5 @@
 // Squares of the floor in colours, with the zones of significant departure, read by the pointer or by keys.
-import { FloorView, Legend, drawZones, fit, scaleFor } from '../floor.jsx';
+import { FloorView, Legend, drawZones, fit, scaleFor, strokeBox } from '../floor.jsx';
 import { palette, useTheme } from '../theme.js';
 import { useNarrow } from '../widgets.jsx';
 
@@ -26,9 +26,7 @@ function drawSquares(c, view, { map, value, scale, marked }) {
     const [x, y] = view.to(cell.x_m, cell.y_m + map.cell_m);
     const of = value(cell);
     if (of === null) {
-      c.strokeStyle = p.line;
-      c.lineWidth = 1;
-      c.strokeRect(x + 0.5, y + 0.5, Math.max(1, side - 1 - gap), Math.max(1, side - 1 - gap));
+      strokeBox(c, p.line, 1, x + 0.5, y + 0.5, Math.max(1, side - 1 - gap), Math.max(1, side - 1 - gap));
     } else {
       c.fillStyle = scale.colourOf(of);
       c.fillRect(x, y, side - gap, side - gap);
@@ -36,9 +34,7 @@ function drawSquares(c, view, { map, value, scale, marked }) {
   }
   if (marked === null) return;
   const [x, y] = view.to(marked.x_m, marked.y_m + map.cell_m);
-  c.lineWidth = 3;
-  c.strokeStyle = p.accent;
-  c.strokeRect(x - 1.5, y - 1.5, side + 3, side + 3);
+  strokeBox(c, p.accent, 3, x - 1.5, y - 1.5, side + 3, side + 3);
 }
 
 // `value(cell)`: the value that its colour shows, null if missing. `kind` as of scaleFor().

@@ -27,25 +27,16 @@ function filterOf(given) {
   };
 }
 
-// What colours show: {name, title, kind, value(cell), unit}.
+// What colours show: {title, kind, unit, value(cell)}.
+const inUnits = (value, unit) => (value === null ? null : value / unit);
+const subject = (title, kind, unit, value) => ({ title, kind, unit, value });
 const subjects = {
   energy: () => {
     const { u } = consumption(1);
-    const per = u === 'J/m' ? 1 : 3.6;
-    return {
-      title: 'consumption',
-      kind: 'power',
-      unit: u,
-      value: (c) => (c.energy_j_per_m === null ? null : c.energy_j_per_m / per),
-    };
+    return subject('consumption', 'power', u, (c) => inUnits(c.energy_j_per_m, u === 'J/m' ? 1 : 3.6));
   },
-  gap: () => ({
-    title: 'departure from the models',
-    kind: 'gap',
-    unit: '%',
-    value: (c) => (c.departure === null ? null : 100 * c.departure),
-  }),
-  time: () => ({ title: 'time spent', kind: 'power', unit: 'min', value: (c) => c.covered_s / 60 }),
+  gap: () => subject('departure from the models', 'gap', '%', (c) => inUnits(c.departure, 0.01)),
+  time: () => subject('time spent', 'power', 'min', (c) => c.covered_s / 60),
 };
 const names = { gap: 'Gap', energy: 'Energy', time: 'Time' };
 
@@ -171,7 +162,6 @@ function Summary({ map }) {
 
 function Shown({ map, show, stale }) {
   const [marked, setMarked] = useState(null);
-  const subject = subjects[show]();
   const here = marked && map.cells.find((c) => c.x_m === marked.x_m && c.y_m === marked.y_m);
   if (map.cells.length === 0)
     return (
@@ -186,7 +176,7 @@ function Shown({ map, show, stale }) {
       <Summary map={map} />
       <div class="columns floor-columns">
         <Panel class="screen" title={`By squares of ${map.cell_m} m`}>
-          <FloorCanvas map={map} {...subject} marked={here ?? null} onMark={setMarked} />
+          <FloorCanvas map={map} {...subjects[show]()} marked={here ?? null} onMark={setMarked} />
           <Marked cell={here ?? null} side={map.cell_m} />
         </Panel>
         <div>

@@ -5,7 +5,7 @@ import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
 import { useRatios } from '../models.js';
 import { robotLink } from '../route.js';
-import { Answer, Button, Empty, Failure, Heading, List, Options, Panel, useTitleOf } from '../widgets.jsx';
+import { Answer, Button, Empty, Failure, Heading, Options, Panel, useTitleOf } from '../widgets.jsx';
 import { Adopt } from './adopt.jsx';
 import { Field } from './choosing.jsx';
 import { Result } from './diagnosis.jsx';
@@ -65,7 +65,7 @@ const Group = ({ name, ids }) =>
     </optgroup>
   );
 
-function Start({ given, onStart }) {
+function Start({ given }) {
   const live = useLive();
   const robots = useModelled();
   const [robot, setRobot] = useState(given.robot ?? '');
@@ -87,7 +87,7 @@ function Start({ given, onStart }) {
     setBusy(true);
     setError(null);
     const body = { robot_id: chosen, max_missions: Number(missions) };
-    await post('/v1/diagnoses', body).then(onStart, setError);
+    await post('/v1/diagnoses', body).then(({ id }) => void (location.hash = `#/gap/${id}`), setError);
     setBusy(false);
   };
   if (live.loaded && robots.length === 0)
@@ -137,26 +137,18 @@ function All({ given }) {
   return (
     <>
       <Heading title="Gap between robot and model" />
-      <Start
-        given={given}
-        onStart={(job) => {
-          location.hash = `#/gap/${job.id}`;
-        }}
-      />
+      <Start given={given} />
       {running && <Progress key={running.id} job={running} onEnd={jobs.reload} />}
       <Panel
         title={given.robot ? `Diagnoses of ${given.robot}` : 'Diagnoses'}
         aside={given.robot && <a href="#/gap">All robots</a>}
+        of={jobs}
+        what="diagnoses"
+        from={(list) => list.diagnoses}
+        none="No diagnosis yet"
+        more="A diagnosis shows where measured power departs from the model, and which effects the model lacks."
       >
-        <List
-          of={jobs}
-          what="diagnoses"
-          from={(list) => list.diagnoses}
-          none="No diagnosis yet"
-          more="A diagnosis shows where measured power departs from the model, and which effects the model lacks."
-        >
-          {(rows) => <JobRows jobs={rows} />}
-        </List>
+        {(rows) => <JobRows jobs={rows} />}
       </Panel>
     </>
   );

@@ -63,5 +63,5 @@ const columns = [
 const ownColumns = columns.filter((c) => !['robot', 'held-out', 'missions'].includes(c.key));
 
 export function JobRows({ jobs, withRobot = true }) {
-  return <Table class="jobs" columns={withRobot ? columns : ownColumns} rows={jobs} keyOf={(d) => d.id} />;
+  return <Table class="jobs" columns={withRobot ? columns : ownColumns} rows={jobs} />;
 }

@@ -31,15 +31,9 @@ function runsOf(mission, trace, idlePowerW) {
       if (trace.modelled_power_w.mean[k] <= idleMargin * idlePowerW) stoodS += coveredS;
     } else {
       if (run === null) {
-        runs.push(
-          (run = {
-            lengthM: 0,
-            stoodS,
-            first: NaN,
-            last: NaN,
-            utimeUs: trace.start_utime_us[k] + trace.width_us / 2,
-          }),
-        );
+        const utimeUs = trace.start_utime_us[k] + trace.width_us / 2;
+        run = { lengthM: 0, stoodS, first: NaN, last: NaN, utimeUs };
+        runs.push(run);
         stoodS = 0;
       }
       run.lengthM += size * coveredS;
@@ -69,14 +63,11 @@ function turnBetween(before, after) {
 // The payload of each run as reported by the robot and used in the accounts; null if not stored or reported.
 async function payloadsOf(mission, runs, signal) {
   if (runs.length > mostAsked) return null;
-  const samples = await Promise.all(
-    runs.map(({ utimeUs }) =>
-      get(
-        `/v1/missions/${mission.id}/telemetry${query({ from_utime_us: Math.round(utimeUs), limit: 1 })}`,
-        signal,
-      ),
-    ),
-  );
+  const sampleOf = ({ utimeUs }) => {
+    const at = query({ from_utime_us: Math.round(utimeUs), limit: 1 });
+    return get(`/v1/missions/${mission.id}/telemetry${at}`, signal);
+  };
+  const samples = await Promise.all(runs.map(sampleOf));
   if (samples.some(({ payload_kg: [said] }) => said === undefined)) return null;
   if (samples.every(({ payload_kg: [said] }) => said === null)) return null;
   let now = mission.payload_kg ?? 0;

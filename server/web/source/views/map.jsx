@@ -1,6 +1,6 @@
 // Robots on the floor, live, with the plan of their map and level; and missions replayed there.
 import { useEffect, useMemo, useState } from 'preact/hooks';
-import { del, putFile, query, useGet } from '../api.js';
+import { del, putFile, query, useEvery, useGet } from '../api.js';
 import { lastAt } from '../chart.jsx';
 import { ConfirmButton } from '../dialog.jsx';
 import { drawZones, powerAt, rowsOf } from '../floor.jsx';
@@ -8,10 +8,10 @@ import * as format from '../format.js';
 import { needsSomeone, powerNow, useAttention } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink, robotLink, useChoices } from '../route.js';
-import { Table, TablePanel, column, figure, names } from '../table.jsx';
+import { Table, column, figure, names } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Answer, Button, Choice, Empty, Failure, Panel } from '../widgets.jsx';
-import { Field, SelectField, fieldsOf } from './choosing.jsx';
+import { Field, SelectField, fieldsOf, placeName } from './choosing.jsx';
 import { MapCanvas, drawLine, drawNamed, planPath, useImage } from './map_canvas.jsx';
 
 // A mission played on the map, with another one over it: both begin at the time 0.
@@ -28,12 +28,8 @@ function usePlayed(id) {
   const played = useMemo(() => {
     if (!id || String(mission.value?.id) !== id || String(trace.value?.id) !== id) return null;
     const of = trace.value;
-    return {
-      mission: mission.value,
-      trace: of,
-      t: of.start_utime_us.map((us) => (us - mission.value.start_utime_us) / 1e6),
-      rows: rowsOf(of),
-    };
+    const t = of.start_utime_us.map((us) => (us - mission.value.start_utime_us) / 1e6);
+    return { mission: mission.value, trace: of, t, rows: rowsOf(of) };
   }, [id, mission.value, trace.value]);
   return [played, mission.error ?? trace.error];
 }
@@ -64,14 +60,7 @@ const playedColumns = [
 function Player({ second, most, change }) {
   const [speed, setSpeed] = useState('10');
   const [playing, setPlaying] = useState(false);
-  useEffect(() => {
-    if (!playing) return undefined;
-    const timer = setInterval(
-      () => change((s) => Math.min(most, s + (Number(speed) * frameMs) / 1000)),
-      frameMs,
-    );
-    return () => clearInterval(timer);
-  }, [playing, speed, most]);
+  useEvery(playing && frameMs, () => change((s) => Math.min(most, s + (Number(speed) * frameMs) / 1000)));
   useEffect(() => {
     if (second >= most) setPlaying(false);
   }, [second >= most]);
@@ -100,7 +89,7 @@ function Player({ second, most, change }) {
   );
 }
 
-function WithField({ of, value, onChange }) {
+function WithField({ of, ...field }) {
   const others = useGet(`/v1/missions${query({ robot_id: of.robot_id, limit: listed })}`);
   const options = (others.value?.missions ?? [])
     .filter(({ id }) => id !== of.id)
@@ -108,9 +97,8 @@ function WithField({ of, value, onChange }) {
   return (
     <SelectField
       label={`Overlay another mission of ${of.robot_id}`}
-      value={value}
-      onChange={onChange}
       options={[['', 'no other mission'], ...options]}
+      {...field}
     />
   );
 }
@@ -149,10 +137,8 @@ function Playback({ given, change, level, image, children }) {
         aside={first && <a href={robotLink(first.mission.robot_id)}>{first.mission.robot_id}</a>}
       >
         <MapCanvas
-          level={level}
-          image={image}
+          {...{ level, image, draw }}
           points={played.flatMap(({ rows }) => rows)}
-          draw={draw}
           changes={[first, other, second]}
           label="Paths of the missions, and where the robots were at the time of the slider"
         />
@@ -194,9 +180,8 @@ function FloorPlanForm({ place, level, onChange }) {
   const set = (part) => setGiven((before) => ({ ...before, ...part }));
   const send = async (event) => {
     event.preventDefault();
-    const values = Object.fromEntries(
-      [...numbers.map(([key]) => key), 'chargers'].map((key) => [key, given[key]]),
-    );
+    const keys = [...numbers.map(([key]) => key), 'chargers'];
+    const values = Object.fromEntries(keys.map((key) => [key, given[key]]));
     try {
       // Without another image the stored one is kept.
       await putFile(planPath(given) + query(values), file ?? (await (await fetch(planPath(level))).blob()));
@@ -207,7 +192,8 @@ function FloorPlanForm({ place, level, onChange }) {
     }
   };
   const { text } = fieldsOf(given, set);
-  const name = { required: true, maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
+  const name = { required: true, ...placeName };
+  const decimal = { inputmode: 'decimal', class: 'short' };
   return (
     <details class="model">
       <summary>{level ? 'Replace or remove the floor plan' : 'Add a floor plan'}</summary>
@@ -231,12 +217,7 @@ function FloorPlanForm({ place, level, onChange }) {
             />
           </Field>
           {numbers.map(([key, label, unit]) =>
-            text(`${label}, ${unit}`, key, {
-              key,
-              inputmode: 'decimal',
-              required: key === 'resolution_m',
-              class: 'short',
-            }),
+            text(`${label}, ${unit}`, key, { ...decimal, key, required: key === 'resolution_m' }),
           )}
           {text('Chargers, x,y;x,y in m', 'chargers', { placeholder: 'none' })}
           <Button type="submit" class="primary" needs="admin">
@@ -286,8 +267,8 @@ const layers = { paths: 'Paths', zones: 'Zones', none: 'Robots only' };
 
 function zonesPath(ids) {
   if (ids.length === 0) return null;
-  const midnight = new Date().setHours(0, 0, 0, 0);
-  return `/v1/floor-map${query({ robot_id: ids.join(), from_utime_us: (midnight - zoneDays * 86_400_000) * 1000, limit: 1 })}`;
+  const fromMs = new Date().setHours(0, 0, 0, 0) - zoneDays * 86_400_000;
+  return `/v1/floor-map${query({ robot_id: ids.join(), from_utime_us: fromMs * 1000, limit: 1 })}`;
 }
 
 const stateOf = ({ state: s }) =>
@@ -326,18 +307,13 @@ function Live({ maps, place, level, image, show, change }) {
       <Panel
         class="screen"
         title={nameOf(JSON.parse(place))}
-        aside={
-          <Choice label="Show" options={layers} value={show} onChange={(next) => change({ show: next })} />
-        }
+        aside={<Choice label="Show" options={layers} {...fieldsOf({ show }, change).of('show')} />}
       >
         {placed.length === 0 && !image ? (
           <Empty title="No robot here reports its position" />
         ) : (
           <MapCanvas
-            level={level}
-            image={image}
-            points={points}
-            draw={draw}
+            {...{ level, image, points, draw }}
             changes={[live.revision, show, zones.value, attention, place]}
             label={`Map with ${placed.length} robots; the table lists them`}
             onPick={pick}
@@ -349,13 +325,9 @@ function Live({ maps, place, level, image, show, change }) {
           {without > 0 && ` ${format.count(without, 'robot reports', 'robots report')} no position.`}
         </p>
       </Panel>
-      <TablePanel
-        title={format.count(entries.length, 'robot')}
-        class="on-map"
-        columns={columns}
-        rows={entries}
-        keyOf={(e) => e.id}
-      />
+      <Panel title={format.count(entries.length, 'robot')}>
+        <Table class="on-map" columns={columns} rows={entries} />
+      </Panel>
     </div>
   );
 }
@@ -370,8 +342,7 @@ function Shown({ maps, given, change, reload }) {
   const choice = (
     <SelectField
       label="Map and level"
-      value={place}
-      onChange={(to) => change({ place: to })}
+      {...fieldsOf({ place }, change).of('place')}
       options={all.map((key) => [key, nameOf(JSON.parse(key))])}
     />
   );
@@ -389,14 +360,7 @@ function Shown({ maps, given, change, reload }) {
       ) : (
         <>
           <div class="wrap filters">{choice}</div>
-          <Live
-            maps={maps}
-            place={place}
-            level={level}
-            image={image}
-            show={given.show ?? 'paths'}
-            change={change}
-          />
+          <Live {...{ maps, place, level, image, change }} show={given.show ?? 'paths'} />
         </>
       )}
       <FloorPlanForm key={place} place={{ map, level: floor }} level={level} onChange={stored} />

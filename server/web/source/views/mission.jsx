@@ -1,5 +1,5 @@
-import { useEffect, useRef } from 'preact/hooks';
-import { idPath, query, useGet } from '../api.js';
+import { useEffect } from 'preact/hooks';
+import { idPath, query, useEvery, useGet } from '../api.js';
 import { loadCharts } from '../chart.jsx';
 import { chargeShare, consumption, energy } from '../energy.js';
 import * as format from '../format.js';
@@ -57,15 +57,11 @@ const payloadVerdicts = {
 function Findings({ of: f, mission }) {
   const p = f.payload;
   const flag = <span class="flag">undeclared payload</span>;
+  const unknown = mission.payload_kg === null && p.declared_kg === 0;
   const assumed = <span class="note">taken as 0 kg</span>;
   const rows = [
     ['Payload', [payloadVerdicts[p.verdict](p), ' ', p.verdict === 'undeclared' && flag]],
-    [
-      'Declared, mean',
-      mission.payload_kg === null && p.declared_kg === 0
-        ? ['– ', assumed]
-        : format.text(format.unit(p.declared_kg, 'kg')),
-    ],
+    ['Declared, mean', unknown ? ['– ', assumed] : format.text(format.unit(p.declared_kg, 'kg'))],
     ['Difference from declared', `${format.withDeviation(p.undeclared_kg, p.undeclared_sd_kg)}\u00a0kg`],
     ['Used for refinement', f.learned_from ? 'yes' : 'no: held out for back-tests'],
   ];
@@ -117,23 +113,14 @@ function Head({ mission: m }) {
 
 function Figures({ mission: m, model }) {
   const e = m.energy;
-  const { ratio } = m;
+  const [name, kind] =
+    e.measured_j === null ? ['Battery energy (modelled)', 'modelled'] : ['Battery energy', 'measured'];
   const share = chargeShare(e.charge_ah, model);
-  const modelledOnly = e.measured_j === null;
+  const ratio = m.ratio === null ? '' : `ratio ${format.fixed(m.ratio, 3)}`;
   const rows = [
-    [
-      modelledOnly ? 'Battery energy (modelled)' : 'Battery energy',
-      energy(e.battery_j),
-      share === null ? '' : `${format.share(share, 2)} of charge`,
-      modelledOnly ? 'modelled' : 'measured',
-    ],
+    [name, energy(e.battery_j), share === null ? '' : `${format.share(share, 2)} of charge`, kind],
     ['Modelled', energy(e.modelled_j), '', 'modelled'],
-    [
-      'Unexplained',
-      format.withSign(energy(e.unexplained_j)),
-      ratio === null ? '' : `ratio ${format.fixed(ratio, 3)}`,
-      'gap',
-    ],
+    ['Unexplained', format.withSign(energy(e.unexplained_j)), ratio, 'gap'],
     ['Distance', format.length(e.distance_m)],
     ['Duration', format.span(e.duration_s)],
     ['Consumption', consumption(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null)],
@@ -143,15 +130,13 @@ function Figures({ mission: m, model }) {
 }
 
 function Comparison({ mission: m, trace }) {
-  if (m.model_version === null)
-    return <Empty title="No model">The robot had no model on this mission.</Empty>;
-  if (m.state === 'open') return <Empty title="Still open">Compared when the mission ends.</Empty>;
+  const not = (title, why) => <Empty title={title}>{why}</Empty>;
+  if (m.model_version === null) return not('No model', 'The robot had no model on this mission.');
+  if (m.state === 'open') return not('Still open', 'Compared when the mission ends.');
   if (m.contradictions.length > 0)
-    return <Empty title="Not compared">The telemetry of this mission is contradicted.</Empty>;
+    return not('Not compared', 'The telemetry of this mission is contradicted.');
   if (m.gap_s > 0)
-    return (
-      <Empty title="Not compared">For {format.span(m.gap_s)} of the mission there is no telemetry.</Empty>
-    );
+    return not('Not compared', `For ${format.span(m.gap_s)} of the mission there is no telemetry.`);
   return trace && <LeastEnergy mission={m} trace={trace} />;
 }
 
@@ -167,16 +152,11 @@ function useMission(id) {
   const merged = trace.value !== null && trace.value.start_utime_us.length >= tracePoints / 2;
   const finer = useGet(merged ? part(`trace${query({ points: finePoints })}`) : null);
   const open = mission.value?.state === 'open';
-  const answers = useRef();
-  answers.current = [mission, ledger, trace, conditions];
-  useEffect(() => {
-    if (!open) return undefined;
-    // Not while a slow service answers: a new request would end the one before.
-    const reload = () =>
-      answers.current.some(({ loading }) => loading) || answers.current.forEach((answer) => answer.reload());
-    const timer = setInterval(reload, renewMs);
-    return () => clearInterval(timer);
-  }, [open]);
+  const answers = [mission, ledger, trace, conditions];
+  // Not while a slow service answers: a new request would end the one before.
+  useEvery(open && renewMs, () => {
+    if (!answers.some(({ loading }) => loading)) answers.forEach((answer) => answer.reload());
+  });
   return { mission, ledger, conditions, trace, fine: merged ? finer.value : trace.value };
 }
 
@@ -209,12 +189,8 @@ export function Mission({ id, given }) {
           </Answer>
           <div class="columns">
             <div>
-              <Panel title="Where the energy went">
-                <Answer of={ledger} what="the ledger">
-                  {({ ledger: l }) => (
-                    <Waterfall terms={l.terms_j} total={l.battery_j} closure={l.closure_relative} />
-                  )}
-                </Answer>
+              <Panel title="Where the energy went" of={ledger} what="the ledger" from={(l) => l.ledger}>
+                {(l) => <Waterfall terms={l.terms_j} total={l.battery_j} closure={l.closure_relative} />}
               </Panel>
               <Panel title="Compared with the minimum-energy drive">
                 <Comparison mission={m} trace={fine} />

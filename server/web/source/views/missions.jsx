@@ -83,19 +83,10 @@ function missionColumns(missions, models, withRobot) {
     .map((c) => ({ ...c, sort: c.key !== 'charge' }));
 }
 
-export function MissionTable({ missions, withRobot = true, sort, onSort }) {
+export function MissionTable({ missions, withRobot = true, order }) {
   const models = useModels(missions.map((m) => m.robot_id));
   const columns = missionColumns(missions, models, withRobot);
-  return (
-    <Table
-      class="missions"
-      columns={columns}
-      rows={missions}
-      keyOf={(m) => m.id}
-      sort={sort}
-      onSort={onSort}
-    />
-  );
+  return <Table class="missions" columns={columns} rows={missions} order={order} />;
 }
 
 const pageRows = 50;
@@ -175,8 +166,7 @@ function Totals({ of }) {
     <Answer of={of} what="totals">
       {(t) => {
         const e = t.energy;
-        const incomplete =
-          t.incomplete_missions > 0 ? `${format.fixed(t.incomplete_missions)} incomplete` : '';
+        const incomplete = t.incomplete_missions > 0 && `${format.fixed(t.incomplete_missions)} incomplete`;
         const part = e.unexplained_j !== null && e.battery_j !== 0 ? e.unexplained_j / e.battery_j : null;
         const rows = [
           ['Missions', format.fixed(t.missions), incomplete],
@@ -193,7 +183,7 @@ function Totals({ of }) {
   );
 }
 
-function List({ given, list, total, sort, onSort }) {
+function List({ given, list, total, order }) {
   const rows = list.value.entries;
   const title = choosing(given) ? 'No mission matches' : 'No mission yet';
   return (
@@ -205,7 +195,7 @@ function List({ given, list, total, sort, onSort }) {
             Missions appear when a robot with a robot file announces one or sends telemetry.
           </Empty>
         ) : (
-          <MissionTable missions={rows} sort={sort} onSort={onSort} />
+          <MissionTable missions={rows} order={order} />
         )}
       </div>
       {rows.length > 0 && (
@@ -225,13 +215,14 @@ function List({ given, list, total, sort, onSort }) {
   );
 }
 
-export function Missions({ given: asked }) {
-  const [given, change] = useChoices(asked);
+export function Missions({ given: begun }) {
+  const [given, change] = useChoices(begun);
   const filter = useMemo(() => filterOf(given), [given]);
-  const [sort, onSort] = orderOf(given, change, { key: 'start', down: true });
-  const order = { sort: sortNames[sort.key] ?? sort.key, order: sort.down ? 'desc' : 'asc' };
+  const order = orderOf(given, change, { key: 'start', down: true });
+  const [{ key, down }] = order;
+  const asked = { ...filter, sort: sortNames[key] ?? key, order: down ? 'desc' : 'asc' };
   const none = misordered(given.from, given.to);
-  const list = useNewest(none ? null : '/v1/missions', { ...filter, ...order }, pageRows);
+  const list = useNewest(none ? null : '/v1/missions', asked, pageRows);
   const totals = useGet(none ? null : `/v1/mission-totals${query(filter)}`);
   const refresh = () => {
     list.reload();
@@ -252,10 +243,10 @@ export function Missions({ given: asked }) {
             <Button href={`#/trends${query({ robot: given.robot })}`}>Trends</Button>
             <Button href="#/trends?of=missions">Compare</Button>
             <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>
-            <Export of={missionFiles({ ...filter, ...order })} total={total} disabled={!total} />
+            <Export of={missionFiles(asked)} total={total} disabled={!total} />
           </div>
           <Answer of={list} what="missions">
-            {() => <List given={given} list={list} total={total} sort={sort} onSort={onSort} />}
+            {() => <List given={given} list={list} total={total} order={order} />}
           </Answer>
         </>
       )}

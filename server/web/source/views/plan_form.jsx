@@ -11,6 +11,12 @@ const snapM = 0.25;
 const reachPx = 12;
 const snapped = (v) => Math.round(v / snapM) * snapM;
 
+const tool = (text, disabled, onClick, more) => (
+  <Button onClick={onClick} disabled={disabled} {...more}>
+    {text}
+  </Button>
+);
+
 // A path drawn point by point. Pointer: press adds, drag moves. Keys: arrows move the cross, Enter adds
 // there, Backspace takes the last away.
 export function DrawPath({ points, change }) {
@@ -44,9 +50,7 @@ export function DrawPath({ points, change }) {
     const here = points[held.current];
     if (here && (here[0] !== point[0] || here[1] !== point[1])) change(points.with(held.current, point));
   };
-  const up = () => {
-    held.current = null;
-  };
+  const up = () => void (held.current = null);
   const key = (event) => {
     const step = event.shiftKey ? 4 * snapM : snapM;
     const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[
@@ -62,27 +66,18 @@ export function DrawPath({ points, change }) {
   const viewFor = (width, tall) => (view.current = viewOf(width / acrossM, 0, 0, width, tall));
   const draw = (c, v) => {
     const p = palette();
-    c.strokeStyle = c.fillStyle = p.accent;
-    c.lineWidth = 3;
     c.lineJoin = 'round';
     const places = points.map(([x, y]) => v.to(x, y));
-    strokeThrough(c, ...places.flat());
+    strokeThrough(c, p.accent, 3, ...places.flat());
     places.forEach((place, k) => drawDot(c, place, 5, k === points.length - 1 ? p.accent : p.screen));
     const [[x0, y0] = [], [x1, y1] = [x0 + 1, y0]] = points;
     if (points.length > 0) drawRobot(c, v, x0, y0, Math.atan2(y1 - y0, x1 - x0), p.ink);
     if (cross) {
       const [x, y] = v.to(...cross);
-      c.strokeStyle = p.ink;
-      c.lineWidth = 1;
-      strokeThrough(c, x - 12, y, x + 12, y);
-      strokeThrough(c, x, y - 12, x, y + 12);
+      strokeThrough(c, p.ink, 1, x - 12, y, x + 12, y);
+      strokeThrough(c, p.ink, 1, x, y - 12, x, y + 12);
     }
   };
-  const button = (text, onClick, disabled, label) => (
-    <Button onClick={onClick} disabled={disabled} aria-label={label}>
-      {text}
-    </Button>
-  );
   return (
     <div class="draw">
       <FloorView
@@ -100,10 +95,10 @@ export function DrawPath({ points, change }) {
         onKeyDown={key}
       />
       <div class="row wrap tools">
-        {button('Undo point', () => change(points.slice(0, -1)), points.length === 0)}
-        {button('Clear', () => change([]), points.length === 0)}
-        {button('+', () => setAcross(acrossM / 2), acrossM <= 4, 'Closer')}
-        {button('−', () => setAcross(acrossM * 2), acrossM >= 256, 'Wider')}
+        {tool('Undo point', points.length === 0, () => change(points.slice(0, -1)))}
+        {tool('Clear', points.length === 0, () => change([]))}
+        {tool('+', acrossM <= 4, () => setAcross(acrossM / 2), { 'aria-label': 'Closer' })}
+        {tool('−', acrossM >= 256, () => setAcross(acrossM * 2), { 'aria-label': 'Wider' })}
         <span class="note">
           Click to add a point, drag to move it; points snap to {snapM} m. The robot turns in place at
           corners.
@@ -115,11 +110,7 @@ export function DrawPath({ points, change }) {
 
 // One of the legs: `change(leg)`, `move(by)`, `remove()`.
 function Leg({ leg, number, count, faulty, change, move, remove }) {
-  const tool = (text, label, disabled, onClick) => (
-    <Button class="plain" disabled={disabled} aria-label={label} onClick={onClick}>
-      {text}
-    </Button>
-  );
+  const plain = (label) => ({ class: 'plain', 'aria-label': label });
   return (
     <li class={faulty ? 'row wrap faulty' : 'row wrap'}>
       <select
@@ -145,9 +136,9 @@ function Leg({ leg, number, count, faulty, change, move, remove }) {
         ))}
       </span>
       <span class="row leg-tools">
-        {tool('↑', `Move leg ${number} up`, number === 1, () => move(-1))}
-        {tool('↓', `Move leg ${number} down`, number === count, () => move(1))}
-        {tool('×', `Remove leg ${number}`, count === 1, remove)}
+        {tool('↑', number === 1, () => move(-1), plain(`Move leg ${number} up`))}
+        {tool('↓', number === count, () => move(1), plain(`Move leg ${number} down`))}
+        {tool('×', count === 1, remove, plain(`Remove leg ${number}`))}
       </span>
     </li>
   );

@@ -1,7 +1,7 @@
 // The panels of a plan: whether the charge suffices, its certificate, and the energy of usual profiles.
 import { useMemo, useState } from 'preact/hooks';
 import { EnergyBars } from '../bars.jsx';
-import { Chart, axis, line, withAlpha } from '../chart.jsx';
+import { Chart, axis, dots, line, withAlpha } from '../chart.jsx';
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { Table, column, figure } from '../table.jsx';
@@ -121,19 +121,16 @@ export function Front({ answer, take }) {
   if (front.length < 2)
     return <Empty title="No trade-off">On this path the fastest drive needs the least energy.</Empty>;
   const [first, last] = [front[0], front[front.length - 1]];
-  const make = (c) => {
-    const points = { show: true, size: 12, width: 2, stroke: c.accent, fill: c.accent };
-    return {
-      scales: { x: { time: false }, y: { range: energyRange } },
-      cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
-      axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${scale.u}`, { size: 72 })],
-      series: [
-        {},
-        { stroke: c.modelled, width: 1.5, spanGaps: true, points: { show: true, size: 5, fill: c.modelled } },
-        { stroke: 'transparent', paths: () => null, points },
-      ],
-    };
-  };
+  const make = (c) => ({
+    scales: { x: { time: false }, y: { range: energyRange } },
+    cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
+    axes: [axis('duration, s', { size: 28, space: 70 }), axis(`energy, ${scale.u}`, { size: 72 })],
+    series: [
+      {},
+      line(c.modelled, 1.5, { spanGaps: true, points: { show: true, size: 5, fill: c.modelled } }),
+      dots(c.accent, 12, 2),
+    ],
+  });
   return (
     <>
       <Chart
@@ -272,19 +269,15 @@ const methods = {
 
 export function Certificate({ answer }) {
   const c = answer.certificate;
+  const { shortest_time_s: s } = c;
   const above = (c.gap_j + c.discretisation_j) / Math.abs(answer.energy_j);
   const energies = [answer.braking_j, answer.recovered_j].map((joule) => format.text(energy(joule)));
   const rows = [
     ['Computed by', methods[c.method] ?? format.words(c.method)],
     ['Excess over the optimum', above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.share(above)}`],
     ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
-    ['Cost of a shorter time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
-    [
-      'Shortest time',
-      format.known(c.shortest_time_s)
-        ? `${format.fixed(c.shortest_time_s, 2)} s, set by the robot’s limits`
-        : 'not bounded',
-    ],
+    ['Cost of a shorter time', priceOfHaste({ ...answer, ...c }, s)],
+    ['Shortest time', format.known(s) ? `${format.fixed(s, 2)} s, set by the robot’s limits` : 'not bounded'],
     ['Limits reached', c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', ')],
     ['Braking', `${energies[0]}, of which ${energies[1]} is recovered`],
     ['Peak power', format.text(format.power(answer.peak_power_w))],

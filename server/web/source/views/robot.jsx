@@ -7,7 +7,7 @@ import * as format from '../format.js';
 import * as health from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
-import { Button, Empty, Facts, Failure, Heading, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Button, Empty, Facts, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { flat } from './changes.jsx';
 import { Field } from './choosing.jsx';
 import { Events, useEvents } from './audit.jsx';
@@ -32,10 +32,8 @@ function LiveMap({ entry }) {
   const earlier = mission && entry.state.mission.start_utime_us < oldest;
   const begun = useGet(earlier ? `/v1/missions/${mission}/trace?points=600` : null);
   const live = entry.path.last();
-  const before =
-    mission && begun.value && begun.value.id === mission
-      ? rowsOf(begun.value, (k) => powerAt(begun.value, k) ?? NaN)
-      : [];
+  const trace = mission && begun.value?.id === mission ? begun.value : null;
+  const before = trace ? rowsOf(trace, (k) => powerAt(trace, k) ?? NaN) : [];
   const rows = [...before, ...live.map(([, x, y, w]) => [x, y, w])];
   const [x, y, heading] = entry.state.pose;
   if (rows.length === 0 || x === null) return <Empty title="No position">{whyNowhere(entry.state)}</Empty>;
@@ -43,7 +41,6 @@ function LiveMap({ entry }) {
     <FloorPath
       points={rows}
       height={340}
-      ends={false}
       robot={[x, y, heading ?? 0]}
       label={`Path of ${entry.id} so far, coloured by power, and where it is now`}
     />
@@ -52,22 +49,17 @@ function LiveMap({ entry }) {
 
 function Now({ entry }) {
   const s = entry.state;
-  const measured = s.measured_power_w !== null;
+  const [name, kind] = s.measured_power_w === null ? ['Power (modelled)', 'modelled'] : ['Power', 'measured'];
   const trace = <health.Sparkline track={entry.power} width={90} height={26} />;
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
-  const note = [s.state_of_charge === null ? '' : health.chargeNote(s).text, voltage]
-    .filter(Boolean)
-    .join(' · ');
+  const charge = s.state_of_charge === null ? '' : health.chargeNote(s).text;
+  const { mission: m } = s;
+  const link = m && <a href={missionLink(m.id)}>{ownPart(m.mission_id, entry.id)}</a>;
   const toCharge = s.charge.time_to_charged_s;
   const [right, left] = s.winding_temperature_c;
   const rows = [
-    [
-      measured ? 'Power' : 'Power (modelled)',
-      format.power(health.powerNow(s)),
-      trace,
-      measured ? 'measured' : 'modelled',
-    ],
-    ['Charge', format.percent(s.state_of_charge), note],
+    [name, format.power(health.powerNow(s)), trace, kind],
+    ['Charge', format.percent(s.state_of_charge), [charge, voltage].filter(Boolean).join(' · ')],
     ['Range', format.length(s.range_m), health.between(s.range_quantiles_m, format.lengthBand)],
     ['Run time', format.about(s.run_time_s), health.between(s.run_time_quantiles_s, format.spanBand)],
     s.charging === null &&
@@ -75,15 +67,7 @@ function Now({ entry }) {
     ['Speed', format.unit(health.now(s, s.speed_m_s), 'm/s', 2)],
     ['Payload', format.unit(s.payload_kg, 'kg')],
     right !== null && ['Windings, right · left', `${format.fixed(right)} · ${format.fixed(left)} °C`],
-    [
-      'Mission',
-      energy(s.mission?.energy.battery_j),
-      s.mission ? (
-        <a href={missionLink(s.mission.id)}>{ownPart(s.mission.mission_id, entry.id)}</a>
-      ) : (
-        'none open'
-      ),
-    ],
+    ['Mission', energy(m?.energy.battery_j), link ?? 'none open'],
   ];
   return (
     <>
@@ -111,10 +95,12 @@ function RecentMissions({ id, running }) {
     <Panel
       title="Recent missions"
       aside={<a href={`#/missions${query({ robot: id })}`}>All missions of {id}</a>}
+      of={missions}
+      what="missions"
+      from={(page) => page.missions}
+      none="No mission yet"
     >
-      <List of={missions} what="missions" from={(page) => page.missions} none="No mission yet">
-        {(rows) => <MissionTable missions={rows} withRobot={false} />}
-      </List>
+      {(rows) => <MissionTable missions={rows} withRobot={false} />}
     </Panel>
   );
 }
@@ -122,10 +108,15 @@ function RecentMissions({ id, running }) {
 function RecentEvents({ id }) {
   const events = useEvents(id, recentEvents);
   return (
-    <Panel title="Log" aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}>
-      <List of={events} what="the log" from={({ entries }) => entries} none="No events yet">
-        {(rows) => <Events events={rows} withRobot={false} />}
-      </List>
+    <Panel
+      title="Log"
+      aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}
+      of={events}
+      what="the log"
+      from={({ entries }) => entries}
+      none="No events yet"
+    >
+      {(rows) => <Events events={rows} withRobot={false} />}
     </Panel>
   );
 }

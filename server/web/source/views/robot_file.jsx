@@ -10,7 +10,7 @@ import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
 import { Answer, Button, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Changes, changesOf, unitOf } from './changes.jsx';
-import { Field, NumberInput, SelectField, fieldsOf } from './choosing.jsx';
+import { Field, NumberInput, SelectField, fieldsOf, placeName } from './choosing.jsx';
 
 const reviewMs = 300;
 
@@ -23,6 +23,8 @@ function named(key) {
 function groupsOf(document) {
   const resolved = (schema) =>
     schema.$ref ? { ...document.components.schemas[schema.$ref.split('/').at(-1)], ...schema } : schema;
+  const isField = ({ type, maxItems, items }) =>
+    ['number', 'string'].includes(type) || (type === 'array' && maxItems === 2 && items.type === 'number');
   const fieldsOf = (of, path) =>
     Object.entries(of.properties)
       .map(([key, schema]) => ({
@@ -31,11 +33,7 @@ function groupsOf(document) {
         pointer: `${path}/${key}`,
         required: of.required.includes(key),
       }))
-      .filter(
-        ({ type, maxItems, items }) =>
-          ['number', 'string'].includes(type) ||
-          (type === 'array' && maxItems === 2 && items.type === 'number'),
-      );
+      .filter(isField);
   const robot = document.components.schemas.robot;
   const groups = Object.entries(robot.properties)
     .map(([key, schema]) => ({ key, ...resolved(schema) }))
@@ -217,12 +215,11 @@ function Place({ id, onError }) {
     setSaved(false);
     setPlace({ ...place, ...part });
   });
-  const name = { maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
   return (
     <Panel title="Map and level">
       <div class="wrap filters">
-        {text('Map', 'map', name)}
-        {text('Level', 'level', name)}
+        {text('Map', 'map', placeName)}
+        {text('Level', 'level', placeName)}
         <Button needs="operate" onClick={save}>
           {saved ? 'Set' : 'Set map and level'}
         </Button>
@@ -236,13 +233,16 @@ function Place({ id, onError }) {
   );
 }
 
+// After a change of the robot.
+function leave(id, hash) {
+  forgetModel(id);
+  reloadFleet();
+  location.hash = hash;
+}
+
 function Remove({ id, onError }) {
   const remove = ({ history }) =>
-    del(`/v1/robots/${idPath(id)}${query({ history })}`).then(() => {
-      forgetModel(id);
-      reloadFleet();
-      location.hash = '#/fleet';
-    }, onError);
+    del(`/v1/robots/${idPath(id)}${query({ history })}`).then(() => leave(id, '#/fleet'), onError);
   return (
     <ConfirmButton
       label="Remove this robot"
@@ -283,11 +283,7 @@ function Form({ groups, id, stored, begun }) {
     (!stored && known ? `There is a robot ${name} already.` : undefined) ??
     (stored && changes.length === 0 ? 'Nothing has changed.' : undefined);
   const save = () =>
-    put(`/v1/robots/${idPath(name)}`, file).then(() => {
-      forgetModel(name);
-      reloadFleet();
-      location.hash = robotLink(name);
-    }, setError);
+    put(`/v1/robots/${idPath(name)}`, file).then(() => leave(name, robotLink(name)), setError);
   return (
     <>
       <Sources onFile={take} onError={setError} />

@@ -2,13 +2,13 @@
 import { useMemo, useState } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
 import { Bars } from '../bars.jsx';
-import { Chart, axis, clockAxis, line, timesWith } from '../chart.jsx';
+import { Chart, axis, clockAxis, dots, line, timesWith } from '../chart.jsx';
 import { ConfirmButton } from '../dialog.jsx';
 import { strokeThrough } from '../floor.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { palette } from '../theme.js';
-import { Answer, Button, Empty, Failure, Key, List, Panel } from '../widgets.jsx';
+import { Button, Empty, Failure, Key, Panel } from '../widgets.jsx';
 import { AdoptButton, BackTest, TestButton, useAdoption } from './adopt.jsx';
 import { Changes, changesOf } from './changes.jsx';
 import { origins } from './audit.jsx';
@@ -196,17 +196,15 @@ function RatioChart({ history }) {
     const line = (at, colour, text, row, dash) => {
       const x = u.valToPos(at / 1e6, 'x', true);
       if (x < left || x > left + width) return;
-      c.strokeStyle = c.fillStyle = colour;
       c.setLineDash(dash.map((d) => d * px));
-      strokeThrough(c, x, top, x, top + height);
+      strokeThrough(c, colour, px, x, top, x, top + height);
+      c.fillStyle = colour;
       const room = c.measureText(text).width + 8 * px;
       c.fillText(text, x + room > left + width ? x - room : x + 4 * px, top + row * 14 * px);
     };
     c.save();
-    c.lineWidth = px;
     c.font = `${11 * px}px "Liberation Sans", Arial, sans-serif`;
-    c.strokeStyle = p.muted;
-    strokeThrough(c, left, y1, left + width, y1);
+    strokeThrough(c, p.muted, px, left, y1, left + width, y1);
     // A version counts from the first mission that it metered: replayed missions are older than the version.
     for (const v of versions) {
       const first = missions.find((m) => m.model_version === v.model_version);
@@ -222,16 +220,7 @@ function RatioChart({ history }) {
       y: { range: () => [1 - spread, 1 + spread] },
     },
     axes: [axis('', clockAxis), axis('measured / modelled', { size: 56 })],
-    series: [
-      {},
-      {
-        stroke: 'transparent',
-        width: 0,
-        points: { show: true, size: 7, width: 1.5, stroke: p.measured, fill: p.measured },
-        paths: () => null,
-      },
-      line(p.gap, 2, { spanGaps: true }),
-    ],
+    series: [{}, dots(p.measured, 7, 1.5), line(p.gap, 2, { spanGaps: true })],
     cursor: { show: false },
     hooks: { drawAxes: [drawMarks] },
   });
@@ -269,12 +258,8 @@ function Siblings({ siblings, id }) {
   const here = siblings.some((s) => s.robot_id === id);
   if (siblings.length <= (here ? 1 : 0))
     return <Empty title="No other robot of this kind has missions yet" />;
-  const off = Math.max(
-    0.02,
-    ...siblings
-      .flatMap((s) => [Math.abs(s.ci[0] - 1), Math.abs(s.ci[1] - 1)])
-      .filter((v) => Number.isFinite(v)),
-  );
+  const offs = siblings.flatMap(({ ci }) => ci.map((v) => Math.abs(v - 1)));
+  const off = Math.max(0.02, ...offs.filter(Number.isFinite));
   const at = (v) => `${50 + 50 * Math.max(-1, Math.min(1, (v - 1) / off))}%`;
   const some = whole || siblings.length <= mostSiblings ? siblings : chosenOf(siblings, id);
   return (
@@ -324,27 +309,28 @@ export function RobotHistory({ id, turn, onChange }) {
           class="screen"
           title="Measured over modelled energy"
           aside={<a href={`#/gap${query({ robot: id })}`}>Diagnose the gap</a>}
+          of={history}
+          what="the history"
         >
-          <Answer of={history} what="the history">
-            {(h) => <RatioChart history={h} />}
-          </Answer>
+          {(h) => <RatioChart history={h} />}
         </Panel>
-        <Panel title="Robots of this kind">
-          <Answer of={history} what="robots of this kind">
-            {(h) => <Siblings siblings={h.siblings} id={id} />}
-          </Answer>
+        <Panel title="Robots of this kind" of={history} what="robots of this kind">
+          {(h) => <Siblings siblings={h.siblings} id={id} />}
         </Panel>
       </div>
       <div class="columns">
-        <Panel title="Diagnoses" aside={<a href={`#/gap${query({ robot: id })}`}>All of {id}</a>}>
-          <List of={jobs} what="diagnoses" from={(j) => j.diagnoses} none="No diagnosis yet">
-            {(rows) => <JobRows jobs={rows} withRobot={false} />}
-          </List>
+        <Panel
+          title="Diagnoses"
+          aside={<a href={`#/gap${query({ robot: id })}`}>All of {id}</a>}
+          of={jobs}
+          what="diagnoses"
+          from={(j) => j.diagnoses}
+          none="No diagnosis yet"
+        >
+          {(rows) => <JobRows jobs={rows} withRobot={false} />}
         </Panel>
-        <Panel title="Model versions">
-          <Answer of={versions} what="models">
-            {(v) => <Versions versions={v.models} robot={id} onChange={onChange} />}
-          </Answer>
+        <Panel title="Model versions" of={versions} what="models">
+          {(v) => <Versions versions={v.models} robot={id} onChange={onChange} />}
         </Panel>
       </div>
     </>

@@ -107,18 +107,12 @@ function Charts({ trace, mission, setZoom, setCursor }) {
   }, [trace]);
   const traceNow = useRef(trace);
   traceNow.current = trace;
+  const indexAt = (second) => lastAt(traceNow.current.start_utime_us, mission.start_utime_us + second * 1e6);
   const plots = useRef(new Set());
   const hooks = {
     init: [(u) => plots.current.add(u)],
     destroy: [(u) => plots.current.delete(u)],
-    setCursor: [
-      (u) =>
-        setCursor(
-          format.known(u.cursor.idx)
-            ? lastAt(traceNow.current.start_utime_us, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6)
-            : null,
-        ),
-    ],
+    setCursor: [({ data: [t], cursor: { idx } }) => setCursor(format.known(idx) ? indexAt(t[idx]) : null)],
     setSelect: [
       (u) => {
         if (u.select.width < 6) return;
@@ -206,15 +200,10 @@ function AtCursor({ trace, mission, index }) {
   const measured = trace.measured_power_w;
   const modelled = trace.modelled_power_w;
   const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];
-  const band = at !== null && measured.mean[at] !== null;
+  const [low, high] = [of(measured.min, format.fixed), of(measured.max, format.fixed)];
   const rows = [
     ['Time', at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)],
-    [
-      'Measured',
-      of(measured.mean, format.power),
-      band && `${format.fixed(measured.min[at], 0)} to ${format.fixed(measured.max[at], 0)}`,
-      'measured',
-    ],
+    ['Measured', of(measured.mean, format.power), gap !== null && `${low} to ${high}`, 'measured'],
     ['Modelled', of(modelled.mean, format.power), '', 'modelled'],
     ['Gap', format.withSign(format.power(gap)), '', 'gap'],
     ['Speed', of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))],

@@ -242,17 +242,12 @@ function Sums({ now, before, period, robots }) {
   };
   const { stays, joule: put, whole } = (charged.path === key && charged.value) || {};
   const notes = [`in ${format.count(stays, 'stay')}`, ...worthTexts(tariff, put)].join(', ');
+  const unused = stays && whole && put > 0 && format.percent((put - used) / put);
   const rows = [
     changed('Energy', joule, energy),
     ...worthNames.map(([key, name]) => worth[key] && [name, worth[key]]),
     stays && [whole ? 'Charged' : 'Charged, at least', energy(put), notes],
-    stays &&
-      whole &&
-      put > 0 && [
-        'Not used in missions',
-        format.percent((put - used) / put),
-        'of which: losses, use between missions, higher charge',
-      ],
+    unused && ['Not used in missions', unused, 'of which: losses, use between missions, higher charge'],
     changed('Consumption', perMetre, consumption),
     changed('Distance', (t) => t.energy.distance_m, format.kilometres),
     changed('Missions', (t) => t.missions, format.fixed),
@@ -290,9 +285,7 @@ function Sides({ sides }) {
     column('name', '', (r) => r.name, { head: true }),
     ...sides.map(({ name }, k) => figure(k, name, (r) => r.cell(r.values[k]))),
     sides.length === 2 &&
-      figure('change', 'Change', (r) => !r.count && format.withSign(changeOf(r)), {
-        class: 'figure long',
-      }),
+      figure('change', 'Change', (r) => !r.count && format.withSign(changeOf(r)), { class: 'figure long' }),
     column('bars', '', (r) => r.term && <Strips of={r.values.map(stripOf)} tallPx={8} />, {
       class: 'bar-cell wide',
     }),
