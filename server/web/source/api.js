@@ -43,9 +43,7 @@ async function call(path, options) {
   return answer(response);
 }
 
-export function get(path, signal) {
-  return call(path, { signal });
-}
+export const get = (path, signal) => call(path, { signal });
 
 // {text, next}: the response in that media type, and the path of the next page or null.
 export async function getText(path, type, signal) {
@@ -60,13 +58,10 @@ const send = (method) => (path, body, signal) =>
 export const post = send('POST');
 export const put = send('PUT');
 
-export function putFile(path, file) {
-  return call(path, { method: 'PUT', body: file, headers: { 'content-type': file.type } });
-}
+export const putFile = (path, file) =>
+  call(path, { method: 'PUT', body: file, headers: { 'content-type': file.type } });
 
-export function del(path) {
-  return call(path, { method: 'DELETE' });
-}
+export const del = (path) => call(path, { method: 'DELETE' });
 
 // Empty, null and undefined values are left out.
 export function query(values) {

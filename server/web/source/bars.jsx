@@ -6,7 +6,6 @@ export const Strips = ({ of, tallPx }) => (
   <svg width="100%" height={tallPx * of.length} aria-hidden="true" focusable="false">
     {of.map(([share, kind], k) => (
       <rect
-        key={k}
         class={`account ${kind}`}
         y={tallPx * (k + 1 / 6)}
         height={(2 / 3) * tallPx}
@@ -26,9 +25,7 @@ export function Bars({ rows, label, head, class: name = '' }) {
         <thead class="hidden">
           <tr>
             {head.map((title) => (
-              <th key={title} scope="col">
-                {title}
-              </th>
+              <th scope="col">{title}</th>
             ))}
           </tr>
         </thead>

@@ -23,9 +23,7 @@ export function Dialog({ open, title, action, onSubmit, onClose, children, ...mo
             <button type="submit" class="primary">
               {action}
             </button>
-            <button type="button" onClick={onClose}>
-              Cancel
-            </button>
+            <Button onClick={onClose}>Cancel</Button>
           </p>
         </form>
       )}

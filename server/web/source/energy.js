@@ -23,9 +23,8 @@ export function energyScale(values, significant = 3) {
   return { u, joule, places: decimals(middle / joule, significant) };
 }
 
-export function energyIn(scale, value) {
-  return known(value) ? { n: fixed(value / scale.joule, scale.places), u: scale.u } : none;
-}
+export const energyIn = (scale, value) =>
+  known(value) ? { n: fixed(value / scale.joule, scale.places), u: scale.u } : none;
 
 // A single energy.
 export function energy(value, significant = 3) {

@@ -64,15 +64,13 @@ export function fit(points, width, height, margin = 28, leastM = 2) {
   return viewOf(Math.min(wide, tall), cx, cy, width, height);
 }
 
-export function viewOf(scale, cx, cy, width, height) {
-  return {
-    scale,
-    width,
-    height,
-    to: (x, y) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale],
-    from: (px, py) => [cx + (px - width / 2) / scale, cy - (py - height / 2) / scale],
-  };
-}
+export const viewOf = (scale, cx, cy, width, height) => ({
+  scale,
+  width,
+  height,
+  to: (x, y) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale],
+  from: (px, py) => [cx + (px - width / 2) / scale, cy - (py - height / 2) / scale],
+});
 
 function niceLength(metre) {
   const power = 10 ** Math.floor(Math.log10(metre));
@@ -277,13 +275,11 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor,
   );
 }
 
-export function Legend({ scale, title, unit = 'W' }) {
-  return (
-    <div class="row legend">
-      <span>{title}</span>
-      <span class="number">{digits(scale.low, 2)}</span>
-      <span class="colours" style={{ background: `linear-gradient(90deg, ${scale.colours})` }} />
-      <span class="number">{`${digits(scale.high, 2)}\u00a0${unit}`}</span>
-    </div>
-  );
-}
+export const Legend = ({ scale, title, unit = 'W' }) => (
+  <div class="row legend">
+    <span>{title}</span>
+    <span class="number">{digits(scale.low, 2)}</span>
+    <span class="colours" style={{ background: `linear-gradient(90deg, ${scale.colours})` }} />
+    <span class="number">{`${digits(scale.high, 2)}\u00a0${unit}`}</span>
+  </div>
+);

@@ -11,9 +11,7 @@ function group(text) {
   return part === undefined ? grouped : `${grouped}.${part}`;
 }
 
-export function known(value) {
-  return typeof value === 'number' && Number.isFinite(value);
-}
+export const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
 // `places` digits after the point.
 export function fixed(value, places = 0) {
@@ -91,17 +89,13 @@ export function withDeviation(value, deviation) {
 export const likeDeviation = (value, deviation) =>
   known(deviation) && deviation > 0 ? fixed(value, placesOf(deviation)) : digits(value);
 
-export function percent(share, places = 0) {
-  return known(share) ? { n: fixed(share * 100, places), u: '%' } : none;
-}
+export const percent = (share, places = 0) =>
+  known(share) ? { n: fixed(share * 100, places), u: '%' } : none;
 
-export function unit(value, u, places) {
-  return known(value) ? { n: places === undefined ? digits(value) : fixed(value, places), u } : none;
-}
+export const unit = (value, u, places) =>
+  known(value) ? { n: places === undefined ? digits(value) : fixed(value, places), u } : none;
 
-export function text(quantity) {
-  return quantity.u === '' ? quantity.n : `${quantity.n}\u00a0${quantity.u}`;
-}
+export const text = (quantity) => (quantity.u === '' ? quantity.n : `${quantity.n}\u00a0${quantity.u}`);
 
 export const share = (value, places = 0) => text(percent(value, places));
 

@@ -89,11 +89,7 @@ function OfflineBanner() {
       {live.link === 'offline'
         ? `No connection to the service since ${since}. The data are of that time. Reconnecting …`
         : `Signed out since ${since}. The data are of that time. `}
-      {live.link === 'refused' && (
-        <button type="button" onClick={askToSignIn}>
-          Sign in
-        </button>
-      )}
+      {live.link === 'refused' && <Button onClick={askToSignIn}>Sign in</Button>}
     </div>
   );
 }
@@ -115,7 +111,7 @@ function App() {
   }, [route.view, route.id]);
   const [View, name, here = route.view] = views.get(route.view) ?? [];
   useTitleOf(name); // until the view sets another one
-  const change = unit === 'Wh' ? 'show energy in joules' : 'show energy in watt hours';
+  const hint = unit === 'Wh' ? 'show energy in joules' : 'show energy in watt hours';
   const theme = dark ? 'Light theme' : 'Dark theme';
   const tab = ([view, [, name]]) =>
     name &&
@@ -142,12 +138,7 @@ function App() {
         </a>
         <nav aria-label="Views">{[...views].map(tab)}</nav>
         <Link />
-        <Button
-          class="unit-choice"
-          onClick={toggleEnergyUnit}
-          aria-label={`${unit}: ${change}`}
-          title={change}
-        >
+        <Button class="unit-choice" onClick={toggleEnergyUnit} aria-label={`${unit}: ${hint}`} title={hint}>
           {unit}
         </Button>
         <Button class="row theme" onClick={toggleTheme} aria-label={theme} title={theme}>

@@ -14,19 +14,14 @@ const titles = {
 };
 const title = titles[result.kind] ?? `Why robot ${result.robot_id}'s power differs from its model`;
 
-function Offer({ of: offer }) {
-  if (offer.refusal !== null)
-    return (
-      <p class="failure">
-        <b>Not to be adopted:</b> {offer.refusal}.
-      </p>
-    );
-  return (
-    <p>
-      These effects may be adopted in the robot file: {offer.effects.map((e) => effectName(e.id)).join(', ')}.
+const Offer = ({ of: { refusal, effects } }) =>
+  refusal === null ? (
+    <p>These effects may be adopted in the robot file: {effects.map((e) => effectName(e.id)).join(', ')}.</p>
+  ) : (
+    <p class="failure">
+      <b>Not to be adopted:</b> {refusal}.
     </p>
   );
-}
 
 const [right, left] = robot.motor.friction_torque_nm;
 const originLines = [

@@ -1,5 +1,5 @@
 // Tables of records. On a narrow screen each row becomes a card, with the column's title next to each value.
-import { Options, Panel, shown } from './widgets.jsx';
+import { Button, Options, Panel, shown } from './widgets.jsx';
 
 export const names = new Intl.Collator('en', { numeric: true });
 
@@ -33,14 +33,7 @@ export function Head({ columns, order: [sort, onSort] = [] }) {
     <thead>
       <tr>
         {columns.map((c) => (
-          <th
-            key={c.key}
-            scope="col"
-            class={c.class}
-            style={{ width: c.width }}
-            title={c.hint}
-            aria-sort={direction(c)}
-          >
+          <th scope="col" class={c.class} style={{ width: c.width }} title={c.hint} aria-sort={direction(c)}>
             {onSort && c.sort ? (
               <button type="button" onClick={() => onSort(c.key)}>
                 {c.title}
@@ -69,9 +62,7 @@ export function SortChoice({ columns, order: [sort, onSort] }) {
           <Options of={sortable} />
         </select>
       </label>
-      <button type="button" onClick={() => onSort(sort.key)}>
-        {sort.down ? 'Descending' : 'Ascending'}
-      </button>
+      <Button onClick={() => onSort(sort.key)}>{sort.down ? 'Descending' : 'Ascending'}</Button>
     </span>
   );
 }
@@ -95,23 +86,21 @@ export const Cells = ({ columns, row }) =>
 
 // columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by};
 // `order`, of orderOf(): of a table that can be sorted. Rows are identified by key, id or robot_id, if any.
-export function Table({ columns, rows, order, class: name = '' }) {
-  return (
-    <>
-      {order && <SortChoice columns={columns} order={order} />}
-      <table class={`grid cards ${name}`}>
-        <Head columns={columns} order={order} />
-        <tbody>
-          {rows.map((row, k) => (
-            <tr key={row.key ?? row.id ?? row.robot_id ?? k}>
-              <Cells columns={columns} row={row} />
-            </tr>
-          ))}
-        </tbody>
-      </table>
-    </>
-  );
-}
+export const Table = ({ columns, rows, order, class: name = '' }) => (
+  <>
+    {order && <SortChoice columns={columns} order={order} />}
+    <table class={`grid cards ${name}`}>
+      <Head columns={columns} order={order} />
+      <tbody>
+        {rows.map((row, k) => (
+          <tr key={row.key ?? row.id ?? row.robot_id ?? k}>
+            <Cells columns={columns} row={row} />
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  </>
+);
 
 // Nothing without rows.
 export const TablePanel = ({ title, aside, note, ...table }) =>

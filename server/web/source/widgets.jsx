@@ -59,37 +59,31 @@ export function Ratio({ value }) {
   return <span class={off ? 'ratio off' : 'ratio'}>{format.fixed(value, 3)}</span>;
 }
 
-export function Empty({ title, children }) {
-  return (
-    <div class="empty">
-      <p class="empty-title">{title}</p>
-      {children && <p>{children}</p>}
-    </div>
-  );
-}
+export const Empty = ({ title, children }) => (
+  <div class="empty">
+    <p class="empty-title">{title}</p>
+    {children && <p>{children}</p>}
+  </div>
+);
 
-export function Loading({ what }) {
-  return (
-    <div class="loading" role="status">
-      <span class="sweep" aria-hidden="true" />
-      Loading {what} …
-    </div>
-  );
-}
+export const Loading = ({ what }) => (
+  <div class="loading" role="status">
+    <span class="sweep" aria-hidden="true" />
+    Loading {what} …
+  </div>
+);
 
 export function Failure({ error, retry }) {
   const where = error.field && !error.message.includes(error.field) ? ` (${error.field})` : '';
+  const refused = error.status === 401;
+  const act = refused ? askToSignIn : retry;
   return (
-    <div class={error.status === 401 ? 'empty' : 'failure'} role="alert">
+    <div class={refused ? 'empty' : 'failure'} role="alert">
       <p class="empty-title">
-        {[error.title ?? 'Error', error.status !== 401 && error.status].filter(Boolean).join(' · ')}
+        {[error.title ?? 'Error', !refused && error.status].filter(Boolean).join(' · ')}
       </p>
       <p>{error.message + where}</p>
-      {(retry || error.status === 401) && (
-        <button type="button" onClick={error.status === 401 ? askToSignIn : retry}>
-          {error.status === 401 ? 'Sign in' : 'Try again'}
-        </button>
-      )}
+      {act && <Button onClick={act}>{refused ? 'Sign in' : 'Try again'}</Button>}
     </div>
   );
 }
@@ -107,17 +101,15 @@ export function Answer({ of, what, missing, from = (value) => value, none, more,
 }
 
 // With `of`, a result of useGet, its content is that of an Answer.
-export function Panel({ title, aside, children, class: name, of, ...answer }) {
-  return (
-    <section class={`panel ${name ?? ''}`}>
-      <header class="row wrap">
-        <h2>{title}</h2>
-        {aside && <div class="row aside">{aside}</div>}
-      </header>
-      {of ? <Answer {...{ of, children, ...answer }} /> : children}
-    </section>
-  );
-}
+export const Panel = ({ title, aside, children, class: name, of, ...answer }) => (
+  <section class={`panel ${name ?? ''}`}>
+    <header class="row wrap">
+      <h2>{title}</h2>
+      {aside && <div class="row aside">{aside}</div>}
+    </header>
+    {of ? <Answer {...{ of, children, ...answer }} /> : children}
+  </section>
+);
 
 // Texts as a list in a panel; nothing without texts.
 export const TextPanel = ({ title, of }) =>
@@ -150,17 +142,15 @@ export function Button({ needs, refusal = needs && refusalFor(needs), disabled, 
 }
 
 // `options`: {key: name}.
-export function Choice({ label, options, value, onChange }) {
-  return (
-    <div class="choice" role="group" aria-label={label}>
-      {Object.entries(options).map(([key, name]) => (
-        <button key={key} type="button" aria-pressed={String(key === value)} onClick={() => onChange(key)}>
-          {name}
-        </button>
-      ))}
-    </div>
-  );
-}
+export const Choice = ({ label, options, value, onChange }) => (
+  <div class="choice" role="group" aria-label={label}>
+    {Object.entries(options).map(([key, name]) => (
+      <button key={key} type="button" aria-pressed={String(key === value)} onClick={() => onChange(key)}>
+        {name}
+      </button>
+    ))}
+  </div>
+);
 
 // Confines an error in one view to that view.
 export function Guard({ children }) {

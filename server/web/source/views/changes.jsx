@@ -14,9 +14,7 @@ export function unitOf(name) {
   return [format.words(end ? name.slice(0, -end.length - 1) : name), units.get(end) ?? ''];
 }
 
-function text(value) {
-  return typeof value === 'number' ? format.digits(value, 4) : String(value);
-}
+const text = (value) => (typeof value === 'number' ? format.digits(value, 4) : String(value));
 
 // A document's leaves by their path: {"battery.capacity_ah": "40", …}.
 export function flat(value, name = '', into = {}) {

@@ -88,7 +88,8 @@ const ownFacts = [
 function Shown({ of }) {
   const live = useLive();
   const order = orderOf(...useChoices({}), { key: 'robot', down: false });
-  const leases = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
+  const rows = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
+  const leases = sorted(rows, leaseColumns, order);
   return (
     <>
       {of.error && (
@@ -106,12 +107,7 @@ function Shown({ of }) {
           {leases.length === 0 ? (
             <Empty title="No robot has been kept yet" />
           ) : (
-            <Table
-              class="leases"
-              columns={leaseColumns}
-              rows={sorted(leases, leaseColumns, order)}
-              order={order}
-            />
+            <Table class="leases" columns={leaseColumns} rows={leases} order={order} />
           )}
         </Panel>
         <Panel title={`${of.node}, since it started`}>

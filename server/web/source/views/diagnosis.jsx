@@ -64,7 +64,6 @@ function ConditionChart({ map, after }) {
     <Chart
       make={make}
       data={data}
-      changes={[after]}
       label={`Error of the modelled power over ${name}: ${map.before_w
         .map((w, k) => `${named ? map.label[k] : format.digits(middles[k], 2)} ${format.digits(w, 2)} W`)
         .join(', ')}`}
@@ -73,8 +72,8 @@ function ConditionChart({ map, after }) {
 }
 
 // A place that an effect names, as a zone of the map.
-function zonesOf(effects) {
-  return effects
+const zonesOf = (effects) =>
+  effects
     .map((e) => e.parameters)
     .filter((p) => p.x_m && p.y_m && p.radius_m)
     .map(({ x_m: x, y_m: y, radius_m: r }) => ({
@@ -83,7 +82,6 @@ function zonesOf(effects) {
       y_min_m: y.value - r.value,
       y_max_m: y.value + r.value,
     }));
-}
 
 function FloorFigure({ floor, effects }) {
   const [shown, show] = useState('before_w');
@@ -138,7 +136,6 @@ function PowerFigure({ power, after }) {
         make={make}
         data={data}
         height={260}
-        changes={[after]}
         label={`Measured and modelled power of mission ${power.mission_id}`}
       />
       <p class="note foot">
@@ -181,8 +178,8 @@ const partColumns = [
 ];
 
 function Comparison({ of: c }) {
-  const d = c.difference;
-  const parts = d && [
+  const d = c.difference ?? {};
+  const parts = c.difference && [
     ['motion and load', d.by_motion_j],
     ...Object.entries(d.by_effect_j).map(([id, value]) => [effectName(id), value]),
     ['not explained', d.unexplained_j],
@@ -191,11 +188,7 @@ function Comparison({ of: c }) {
   return (
     <>
       <TablePanel title="Groups" columns={groupColumns} rows={c.groups} />
-      <TablePanel
-        title={`Energy per metre of ${d?.to} above ${d?.from}`}
-        columns={partColumns}
-        rows={parts}
-      />
+      <TablePanel title={`Energy per metre of ${d.to} above ${d.from}`} columns={partColumns} rows={parts} />
       {c.strengths.map((s) => (
         <TablePanel
           key={s.id}
@@ -422,8 +415,8 @@ function NextDrives({ result: r }) {
     );
   return (
     <ol class="next">
-      {r.next_drive.map((n, k) => (
-        <li key={k}>
+      {r.next_drive.map((n) => (
+        <li>
           <b>{n.manoeuvre}</b> <span class="note">to distinguish {format.words(n.separates)}</span>
         </li>
       ))}

@@ -191,6 +191,4 @@ function One({ id }) {
   );
 }
 
-export function Gap({ id, given }) {
-  return id ? <One id={id} /> : <All given={given} />;
-}
+export const Gap = ({ id, given }) => (id ? <One id={id} /> : <All given={given} />);

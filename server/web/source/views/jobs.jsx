@@ -22,9 +22,7 @@ export const effectName = (id) =>
 // The verdict in words; diagnoses of earlier versions have only its id.
 export const verdictTitle = (of) => of.verdict_title ?? format.words(of.verdict);
 
-export function State({ of }) {
-  return <span class={`state ${of.state}`}>{stateNotes[of.state]}</span>;
-}
+export const State = ({ of }) => <span class={`state ${of.state}`}>{stateNotes[of.state]}</span>;
 
 // The names of the effects of a verdict, each with those that it is not distinguished from; of another
 // verdict, those that are more likely than not.
@@ -62,6 +60,6 @@ const columns = [
 ];
 const ownColumns = columns.filter((c) => !['robot', 'held-out', 'missions'].includes(c.key));
 
-export function JobRows({ jobs, withRobot = true }) {
-  return <Table class="jobs" columns={withRobot ? columns : ownColumns} rows={jobs} />;
-}
+export const JobRows = ({ jobs, withRobot = true }) => (
+  <Table class="jobs" columns={withRobot ? columns : ownColumns} rows={jobs} />
+);

@@ -92,19 +92,17 @@ export function MissionTable({ missions, withRobot = true, order }) {
 const pageRows = 50;
 
 // The filter as parameters of the service, from the parameters of the address.
-function filterOf(given) {
-  return {
-    robot_id: given.robot,
-    state: given.state,
-    incomplete: given.incomplete,
-    ...timesOf(given.from, given.to),
-    payload_min_kg: given.payload_min,
-    payload_max_kg: given.payload_max,
-    ratio_min: given.ratio_min,
-    ratio_max: given.ratio_max,
-    name_contains: given.name,
-  };
-}
+const filterOf = (given) => ({
+  robot_id: given.robot,
+  state: given.state,
+  incomplete: given.incomplete,
+  ...timesOf(given.from, given.to),
+  payload_min_kg: given.payload_min,
+  payload_max_kg: given.payload_max,
+  ratio_min: given.ratio_min,
+  ratio_max: given.ratio_max,
+  name_contains: given.name,
+});
 
 const records = { '': 'all', false: 'complete', true: 'incomplete' };
 const views = ['sort', 'down']; // how missions are shown, not which

@@ -43,27 +43,23 @@ function useQuestion(address, robots) {
   return [{ ...given, robot: robots.includes(given.robot) ? given.robot : (robots[0] ?? '') }, change];
 }
 
-function requestOf(given) {
-  return {
-    ...(given.way === 'draw' ? drive.pathOfPoints(given.points) : { path: given.legs.map(drive.segmentOf) }),
-    payload_kg: number(given.payload),
-    deadline_s: number(given.deadline),
-    value_of_time_w: number(given.value),
-    pareto_points: frontPoints,
-    baseline_columns: true,
-  };
-}
+const requestOf = (given) => ({
+  ...(given.way === 'draw' ? drive.pathOfPoints(given.points) : { path: given.legs.map(drive.segmentOf) }),
+  payload_kg: number(given.payload),
+  deadline_s: number(given.deadline),
+  value_of_time_w: number(given.value),
+  pareto_points: frontPoints,
+  baseline_columns: true,
+});
 
 // The forecast for the same plan: a plan with a deadline is optimal for the value of time in its certificate.
-function autonomyRequest(request, answer, charge) {
-  return {
-    state_of_charge: charge === undefined ? undefined : charge / 100,
-    payload_kg: request.payload_kg ?? 0,
-    start_pose: request.start_pose ?? { x_m: 0, y_m: 0, heading_rad: 0 },
-    value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w),
-    tasks: [{ task_id: 'this drive', path: request.path }],
-  };
-}
+const autonomyRequest = (request, answer, charge) => ({
+  state_of_charge: charge === undefined ? undefined : charge / 100,
+  payload_kg: request.payload_kg ?? 0,
+  start_pose: request.start_pose ?? { x_m: 0, y_m: 0, heading_rad: 0 },
+  value_of_time_w: Math.min(1e6, answer.certificate.time_multiplier_w),
+  tasks: [{ task_id: 'this drive', path: request.path }],
+});
 
 const noPath = Object.assign(new Error('Draw at least two points.'), { title: 'No path yet' });
 const robotPath = (robot) => `/v1/robots/${idPath(robot)}`;

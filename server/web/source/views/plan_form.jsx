@@ -156,7 +156,6 @@ function Legs({ legs, change, fault }) {
       <ol>
         {legs.map((leg, k) => (
           <Leg
-            key={k}
             leg={leg}
             number={k + 1}
             count={legs.length}
@@ -175,6 +174,7 @@ function Legs({ legs, change, fault }) {
 const length = (points) =>
   points.slice(1).reduce((sum, [x, y], k) => sum + Math.hypot(x - points[k][0], y - points[k][1]), 0);
 
+const ways = { legs: 'Enter legs', draw: 'Draw' };
 const terms = [
   ['payload', 'Payload', 'kg', '0'],
   ['deadline', 'Deadline', 's', 'free'],
@@ -192,11 +192,7 @@ export function PlanForm({ given, robots, change, busy, fault, onCompute }) {
   return (
     <form class="plan-form" onSubmit={submit}>
       {field.select('Robot', 'robot', robots)}
-      <Choice
-        label="How to give the path"
-        {...field.of('way')}
-        options={{ legs: 'Enter legs', draw: 'Draw' }}
-      />
+      <Choice label="How to give the path" {...field.of('way')} options={ways} />
       {given.way === 'legs' ? (
         <Legs legs={given.legs} change={(legs) => change({ legs })} fault={fault} />
       ) : (

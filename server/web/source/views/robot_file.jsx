@@ -105,6 +105,7 @@ function Input({ of, value, fixed, onChange }) {
 
 function FileField({ of, file, fixed, finding, onChange }) {
   const value = valueAt(file, of.pointer);
+  const take = (next) => onChange(changed(file, keysOf(of.pointer), next));
   return (
     <div class="field">
       <span title={of.description}>
@@ -113,12 +114,7 @@ function FileField({ of, file, fixed, finding, onChange }) {
         {!of.required && ' (optional)'}
       </span>
       <span class="row with-unit">
-        <Input
-          of={of}
-          value={value}
-          fixed={fixed}
-          onChange={(v) => onChange(changed(file, keysOf(of.pointer), v))}
-        />
+        <Input of={of} value={value} fixed={fixed} onChange={take} />
         <span class="unit">{of.unit}</span>
       </span>
       {finding && value !== undefined && (
@@ -173,7 +169,7 @@ function Review({ of, file }) {
 
 // Where the file comes from: the disk, or another robot.
 function Sources({ onFile, onError }) {
-  const models = useModelled();
+  const robots = [['', 'choose …'], ...useModelled()];
   const read = async (event) => {
     const [chosen] = event.currentTarget.files;
     try {
@@ -192,12 +188,7 @@ function Sources({ onFile, onError }) {
       <Field label="Load a robot file">
         <input type="file" accept=".json,application/json" onChange={read} />
       </Field>
-      <SelectField
-        label="Copy the values of a robot"
-        value=""
-        onChange={copy}
-        options={[['', 'choose …'], ...models]}
-      />
+      <SelectField label="Copy the values of a robot" value="" onChange={copy} options={robots} />
     </div>
   );
 }

@@ -180,16 +180,9 @@ function Charts({ trace, mission, setZoom, setCursor }) {
         make={makePower}
         data={power}
         height={270}
-        changes={[mission.id]}
         label="Battery power over the mission, measured and modelled, with the least and greatest of each span"
       />
-      <Chart
-        make={makeSpeed}
-        data={speed}
-        height={150}
-        changes={[mission.id]}
-        label="Speed over the mission"
-      />
+      <Chart make={makeSpeed} data={speed} height={150} label="Speed over the mission" />
     </div>
   );
 }

@@ -290,16 +290,11 @@ function Sides({ sides }) {
       class: 'bar-cell wide',
     }),
   ].filter(Boolean);
-  const links = sides.filter(({ link }) => link);
-  const aside = links.map(({ name, link }) => (
-    <a key={link} href={link}>
-      {name}
-    </a>
-  ));
+  const links = sides.filter(({ link }) => link).map(({ name, link }) => <a href={link}>{name}</a>);
   return (
     <TablePanel
       title="Side by side"
-      aside={links.length > 0 && aside}
+      aside={links.length > 0 && links}
       class="compare"
       columns={columns}
       rows={[...figures.slice(0, consumed), ...terms, ...figures.slice(consumed)]}
