@@ -3,7 +3,7 @@ import { useEffect, useLayoutEffect, useRef } from 'preact/hooks';
 import { once, useRead } from './api.js';
 import { energyUnit } from './energy.js';
 import { palette, useTheme } from './theme.js';
-import { fixed, time, two } from './format.js';
+import { date, fixed, two } from './format.js';
 
 const narrow = '"Liberation Sans Narrow", "Arial Narrow", "Helvetica Neue", Arial, sans-serif';
 
@@ -90,7 +90,7 @@ function dateSplits(u, _, low, high, step) {
 export const dateAxis = (days) => ({
   incrs: clockSteps.filter((step) => step >= days * day),
   splits: dateSplits,
-  values: (_, splits) => splits.map((second) => time(second * 1e6).slice(0, 10)),
+  values: (_, splits) => splits.map((second) => date(second * 1e6)),
   space: datePx,
 });
 

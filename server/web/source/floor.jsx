@@ -50,6 +50,9 @@ export function strokeBox(c, colour, width, ...box) {
   c.strokeRect(...box);
 }
 
+// The direction of each arrow key on the floor.
+export const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+
 // The transformation from the floor to the canvas.
 export function fit(points, width, height, margin = 28, leastM = 2) {
   const placed = points.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y));
@@ -158,7 +161,7 @@ export function FloorView({ viewFor, draw, under = drawGrid, onPlace, height, ch
         class="floor"
         role="img"
         ref={canvas}
-        style={{ height: `${height}px` }}
+        style={{ display: 'block', width: '100%', height: `${height}px` }}
         onClick={point}
         onPointerMove={point}
         {...more}
@@ -242,6 +245,7 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor,
   useTheme(); // the scale is of the theme
   const values = shown.map((row) => row[2]);
   const scale = scaleFor(kind, values);
+  const changes = [points, kind, cursor, robot, under];
   const viewFor = (width, tall) =>
     fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
   const draw = (c, view) => {
@@ -263,11 +267,7 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor,
     }
   };
   return (
-    <FloorView
-      {...{ viewFor, draw, height }}
-      aria-label={label}
-      changes={[points, kind, cursor, robot, under]}
-    >
+    <FloorView {...{ viewFor, draw, height, changes }} aria-label={label}>
       {values.some((value) => value > 0 || kind === 'gap') && (
         <Legend scale={scale} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
       )}

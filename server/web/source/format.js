@@ -124,6 +124,8 @@ export function about(second) {
 
 const local = new Intl.DateTimeFormat('sv', { dateStyle: 'short', timeStyle: 'medium' });
 export const time = (utimeUs) => (known(utimeUs) ? local.format(utimeUs / 1000) : dash);
+export const date = (utimeUs) => time(utimeUs).slice(0, 10);
+export const minute = (utimeUs) => time(utimeUs).slice(0, 16);
 export const clock = (utimeUs) => time(utimeUs).slice(-8);
 
 // "1 robot", "3 robots".

@@ -150,7 +150,7 @@ function App() {
       </header>
       <OfflineBanner />
       <SignIn />
-      <main id="main" tabindex="-1" ref={main}>
+      <main id="main" tabindex="-1" ref={main} style={{ outline: 'none' }}>
         <Guard key={route.hash}>
           {View ? (
             <View id={route.id} given={route.given} />

@@ -37,7 +37,7 @@ export function Head({ columns, order: [sort, onSort] = [] }) {
             {onSort && c.sort ? (
               <button type="button" onClick={() => onSort(c.key)}>
                 {c.title}
-                <span class="arrow" aria-hidden="true">
+                <span class="arrow" style={{ display: 'inline-block', width: '12px' }} aria-hidden="true">
                   {c.key === sort?.key ? (sort.down ? '▾' : '▴') : ''}
                 </span>
               </button>

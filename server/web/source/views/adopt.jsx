@@ -191,7 +191,7 @@ export function Adopt({ job }) {
       )}
       {error && !refused && <Failure error={error} />}
       {adopted === null && (
-        <div class="row wrap tools adopt">
+        <div class="row wrap tools adopt" style={{ marginTop: '14px' }}>
           {groups.map((g) => (
             <SelectField
               key={g.id}

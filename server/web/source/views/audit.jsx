@@ -33,7 +33,7 @@ const kinds = {
   gap_drift: [
     'Consumption changed',
     (d) =>
-      `${format.words(d.quantity ?? 'energy')} by ${format.signed(format.share(d.ratio_after / d.ratio_before - 1, 1))} since ${format.time(d.utime_us).slice(0, 10)}; measured over modelled ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
+      `${format.words(d.quantity ?? 'energy')} by ${format.signed(format.share(d.ratio_after / d.ratio_before - 1, 1))} since ${format.date(d.utime_us)}; measured over modelled ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
   ],
   gap_sibling: [
     'Compared with its kind',

@@ -82,7 +82,7 @@ export function DayField({ label, value = '', onChange, minutes }) {
       <span class="row with-unit">
         <TypedInput
           type="text"
-          class="date"
+          style={{ width: '160px' }}
           aria-label={label}
           placeholder={minutes ? 'YYYY-MM-DD hh:mm' : 'YYYY-MM-DD'}
           pattern={pattern}
@@ -94,7 +94,7 @@ export function DayField({ label, value = '', onChange, minutes }) {
         </Button>
         <input
           ref={picker}
-          class="picker"
+          style={{ width: 0, padding: 0, border: 0, marginLeft: '-6px' }}
           type={minutes ? 'datetime-local' : 'date'}
           tabindex="-1"
           aria-hidden="true"

@@ -414,7 +414,7 @@ function NextDrives({ result: r }) {
       </p>
     );
   return (
-    <ol class="next">
+    <ol class="next" style={{ paddingLeft: '22px' }}>
       {r.next_drive.map((n) => (
         <li>
           <b>{n.manoeuvre}</b> <span class="note">to distinguish {format.words(n.separates)}</span>

@@ -41,10 +41,10 @@ export const ownPart = (missionId, robotId) =>
   missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
 
 function Power({ state: s }) {
-  const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
+  const modelled = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
   return [
     <Quantity of={format.power(health.powerNow(s))} />,
-    modelledOnly && <span class="below">modelled</span>,
+    modelled && <span class="below">modelled</span>,
   ];
 }
 
@@ -223,7 +223,7 @@ function Summary({ robots, attention }) {
 const Spacer = ({ rows, heightPx }) =>
   rows > 0 && (
     <tr aria-hidden="true" class="spacer">
-      <td colspan={columns.length} style={{ height: `${rows * heightPx}px` }} />
+      <td colspan={columns.length} style={{ padding: 0, border: 0, height: `${rows * heightPx}px` }} />
     </tr>
   );
 

@@ -1,9 +1,7 @@
 // Squares of the floor in colours, with the zones of significant departure, read by the pointer or by keys.
-import { FloorView, Legend, drawZones, fit, scaleFor, strokeBox } from '../floor.jsx';
+import { FloorView, Legend, arrows, drawZones, fit, scaleFor, strokeBox } from '../floor.jsx';
 import { palette, useTheme } from '../theme.js';
 import { useNarrow } from '../widgets.jsx';
-
-const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 // The nearest square in a direction, adjacent or not.
 function stepFrom(cells, at, [dx, dy]) {
@@ -61,8 +59,8 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
   };
   const key = (event) => {
     if (event.key === 'Escape') onMark(null);
-    else if (event.key in steps)
-      onMark(marked === null ? map.cells[0] : stepFrom(map.cells, marked, steps[event.key]));
+    else if (event.key in arrows)
+      onMark(marked === null ? map.cells[0] : stepFrom(map.cells, marked, arrows[event.key]));
     else return;
     event.preventDefault();
   };

@@ -46,7 +46,7 @@ function Progress({ job, onEnd }) {
       : `${part} %${left}`;
   return (
     <div class="row wrap progress">
-      <label for="progress">
+      <label for="progress" style={{ flexBasis: '100%' }}>
         Diagnosis {job.id} of {job.robot_id}: {stateNotes[now.state]}, {words}
       </label>
       <progress id="progress" max="100" value={now.state === 'queued' ? undefined : part} />

@@ -69,10 +69,11 @@ function Player({ second, most, change }) {
     setPlaying(!playing);
   };
   return (
-    <div class="row wrap player">
+    <div class="row wrap" style={{ gap: '8px 14px', margin: '10px 0' }}>
       <Button onClick={toggle}>{playing ? 'Pause' : 'Play'}</Button>
       <input
         type="range"
+        style={{ flex: 1, minWidth: '180px' }}
         aria-label="Time since the start"
         aria-valuetext={format.span(second)}
         min="0"
@@ -93,7 +94,7 @@ function WithField({ of, ...field }) {
   const others = useGet(`/v1/missions${query({ robot_id: of.robot_id, limit: listed })}`);
   const options = (others.value?.missions ?? [])
     .filter(({ id }) => id !== of.id)
-    .map((m) => [m.id, `${m.mission_id}, ${format.time(m.start_utime_us).slice(0, 16)}`]);
+    .map((m) => [m.id, `${m.mission_id}, ${format.minute(m.start_utime_us)}`]);
   return (
     <SelectField
       label={`Overlay another mission of ${of.robot_id}`}

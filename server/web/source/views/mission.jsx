@@ -130,13 +130,11 @@ function Figures({ mission: m, model }) {
 }
 
 function Comparison({ mission: m, trace }) {
-  const not = (title, why) => <Empty title={title}>{why}</Empty>;
-  if (m.model_version === null) return not('No model', 'The robot had no model on this mission.');
-  if (m.state === 'open') return not('Still open', 'Compared when the mission ends.');
-  if (m.contradictions.length > 0)
-    return not('Not compared', 'The telemetry of this mission is contradicted.');
-  if (m.gap_s > 0)
-    return not('Not compared', `For ${format.span(m.gap_s)} of the mission there is no telemetry.`);
+  const not = (why, title = 'Not compared') => <Empty title={title}>{why}</Empty>;
+  if (m.model_version === null) return not('The robot had no model on this mission.', 'No model');
+  if (m.state === 'open') return not('Compared when the mission ends.', 'Still open');
+  if (m.contradictions.length > 0) return not('The telemetry of this mission is contradicted.');
+  if (m.gap_s > 0) return not(`For ${format.span(m.gap_s)} of the mission there is no telemetry.`);
   return trace && <LeastEnergy mission={m} trace={trace} />;
 }
 

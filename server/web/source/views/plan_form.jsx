@@ -1,7 +1,7 @@
 // The form of a plan: the robot, the path as legs or drawn points, and the terms.
 import { useRef, useState } from 'preact/hooks';
 import { legKinds, newLeg } from '../drive_path.js';
-import { FloorView, drawDot, drawRobot, placeIn, strokeThrough, viewOf } from '../floor.jsx';
+import { FloorView, arrows, drawDot, drawRobot, placeIn, strokeThrough, viewOf } from '../floor.jsx';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
 import { Button, Choice, Options } from '../widgets.jsx';
@@ -53,11 +53,9 @@ export function DrawPath({ points, change }) {
   const up = () => void (held.current = null);
   const key = (event) => {
     const step = event.shiftKey ? 4 * snapM : snapM;
-    const way = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] }[
-      event.key
-    ];
+    const way = arrows[event.key];
     const from = cross ?? points[points.length - 1] ?? [0, 0];
-    if (way) setCross([from[0] + way[0], from[1] + way[1]]);
+    if (way) setCross([from[0] + step * way[0], from[1] + step * way[1]]);
     else if (event.key === 'Enter') add(from);
     else if (event.key === 'Backspace' || event.key === 'Delete') change(points.slice(0, -1));
     else return;
@@ -114,6 +112,7 @@ function Leg({ leg, number, count, faulty, change, move, remove }) {
   return (
     <li class={faulty ? 'row wrap faulty' : 'row wrap'}>
       <select
+        style={{ width: '132px' }}
         aria-label={`Kind of leg ${number}`}
         value={leg.kind}
         onChange={(e) => change(newLeg(e.currentTarget.value))}
@@ -125,6 +124,7 @@ function Leg({ leg, number, count, faulty, change, move, remove }) {
           <label key={key} class="inline">
             <span class="hidden">{`Leg ${number}, ${field.label}`}</span>
             <NumberInput
+              style={{ width: '62px' }}
               min={field.min}
               required
               title={field.label}
@@ -151,9 +151,9 @@ function Legs({ legs, change, fault }) {
     change(next);
   };
   return (
-    <fieldset class="field legs">
+    <fieldset class="field legs" style={{ minWidth: 0 }}>
       <legend>Legs</legend>
-      <ol>
+      <ol style={{ margin: '4px 0 10px', borderTop: '1px solid var(--line)' }}>
         {legs.map((leg, k) => (
           <Leg
             leg={leg}

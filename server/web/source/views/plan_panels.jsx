@@ -142,11 +142,12 @@ export function Front({ answer, take }) {
       <p class="note foot">
         <Key of={{ 'accent dot': 'this plan', modelled: 'cheapest for each duration' }} />
       </p>
-      <div class="row wrap front-pick">
-        <label class="row wrap">
+      <div class="row wrap front-pick" style={{ gap: '8px 14px', marginTop: '8px', fontSize: '13px' }}>
+        <label class="row wrap" style={{ gap: '8px' }}>
           <span>Duration</span>
           <input
             type="range"
+            style={{ minHeight: '24px', width: '240px' }}
             min="0"
             max={front.length - 1}
             value={at}

@@ -127,7 +127,7 @@ function Acknowledge({ robot, reason, onChange, onError }) {
   if (by)
     return (
       <span class="note">
-        Acknowledged{by.by ? ` by ${by.by}` : ''} {format.time(by.utime_us).slice(0, 16)}
+        Acknowledged{by.by ? ` by ${by.by}` : ''} {format.minute(by.utime_us)}
         {by.note && `: ${by.note}`}
       </span>
     );
@@ -197,7 +197,7 @@ export function Robot({ id }) {
     <>
       <Heading title={id} crumbs={<a href="#/fleet">Fleet</a>}>
         {s && (
-          <span class="row wrap health">
+          <span class="row wrap health" style={{ gap: '2px 12px', fontSize: '14px' }}>
             <health.Health state={s} />
           </span>
         )}

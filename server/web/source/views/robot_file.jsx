@@ -299,7 +299,7 @@ function Form({ groups, id, stored, begun }) {
             </Panel>
           ))}
         </div>
-        <div class="beside">
+        <div style={{ position: 'sticky', top: '60px' }}>
           <Panel title="Review">
             {review && <Review of={review} file={file} />}
             <p class="row wrap tools">

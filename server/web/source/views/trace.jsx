@@ -20,6 +20,7 @@ const quantities = {
 
 function Sides({ telemetry, mission, quantity }) {
   const [, label, column] = quantities[quantity];
+  const name = `${label} of both motors over time`;
   const [right, left] = telemetry[column];
   const data = useMemo(
     () => [telemetry.utime_us.map((t) => (t - mission.start_utime_us) / 1e6), right, left],
@@ -33,13 +34,7 @@ function Sides({ telemetry, mission, quantity }) {
   });
   return (
     <>
-      <Chart
-        make={make}
-        data={data}
-        height={200}
-        changes={[quantity]}
-        label={`${label} of both motors over time`}
-      />
+      <Chart make={make} data={data} height={200} changes={[quantity]} label={name} />
       <p class="note foot">
         <Key of={{ accent: 'right', measured: 'left' }} />
         {telemetry.utime_us.length} samples as received
@@ -154,9 +149,13 @@ function Charts({ trace, mission, setZoom, setCursor }) {
     const [t] = power;
     const far = Math.max(1, Math.round(t.length / 20));
     const step = event.shiftKey ? far : 1;
-    const to = { ArrowLeft: at.current - step, ArrowRight: at.current + step, Home: 0, End: t.length - 1 }[
-      event.key
-    ];
+    const places = {
+      ArrowLeft: at.current - step,
+      ArrowRight: at.current + step,
+      Home: 0,
+      End: t.length - 1,
+    };
+    const to = places[event.key];
     const span = t[t.length - 1] - t[0];
     const here = t[Math.min(at.current, t.length - 1)];
     if (to !== undefined) {
@@ -248,9 +247,8 @@ export function TracePanels({ mission, whole, fine, given: asked }) {
   const setZoom = (next) => change({ from: next?.[0].toFixed(2), to: next?.[1].toFixed(2) });
   const utime = (second) => Math.round(mission.start_utime_us + second * 1e6);
   const window = zoom && { from_utime_us: utime(zoom[0]), to_utime_us: utime(zoom[1]) };
-  const closer = useGet(
-    window && `/v1/missions/${mission.id}/trace${query({ points: tracePoints, ...window })}`,
-  );
+  const part = query({ points: tracePoints, ...window });
+  const closer = useGet(window && `/v1/missions/${mission.id}/trace${part}`);
   const trace = zoom !== null && closer.value?.start_utime_us.length > 1 ? closer.value : whole;
   const measured = whole.measured_power_w.mean.some((v) => v !== null);
   if (whole.start_utime_us.length === 0)

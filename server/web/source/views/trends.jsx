@@ -42,7 +42,7 @@ function periodsOf(given, kind) {
 async function readSides(periods, robots, signal) {
   const totals = (filter) => get(totalsPath(filter), signal);
   const [now, before] = await Promise.all(
-    periods.map((times) => totals({ robot_id: robots.join(','), ...times })),
+    periods.map((times) => totals({ robot_id: robots.join(), ...times })),
   );
   const ofRobot = async (robot) => ({
     name: robot,
@@ -165,7 +165,7 @@ function Names({ series }) {
     'stroke-dasharray': dashes[k % dashes.length].join(' '),
   });
   return (
-    <p class="row wrap note key trend-key">
+    <p class="row wrap note key trend-key" style={{ margin: '0 0 10px', gap: '4px 16px' }}>
       {series.map((s, k) => (
         <span key={s.name}>
           <svg width="34" height="8" aria-hidden="true">
@@ -184,7 +184,7 @@ function Periods({ series, kind }) {
   const joules = rows.map(joule);
   const title = kind === 'day' ? 'Day' : 'Week from';
   const columns = [
-    column('period', title, (g) => format.time(g.from_utime_us).slice(0, 10), { head: true }),
+    column('period', title, (g) => format.date(g.from_utime_us), { head: true }),
     series.length > 1 && column('robot', 'Robot', (g) => g.name),
     ...measuresOf(useTariff(), joules)
       .slice(0, -3)
@@ -304,10 +304,7 @@ function Sides({ sides }) {
 
 function MissionsField(more) {
   const recent = useGet('/v1/missions?limit=200').value?.missions ?? [];
-  const options = recent.map((m) => [
-    String(m.id),
-    `${nameOf(m)} ${format.time(m.start_utime_us).slice(0, 16)}`,
-  ]);
+  const options = recent.map((m) => [String(m.id), `${nameOf(m)} ${format.minute(m.start_utime_us)}`]);
   return <Several label="Missions" one="Mission" options={options} none="choose …" {...more} />;
 }
 
