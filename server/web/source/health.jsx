@@ -26,7 +26,7 @@ export function Sparkline({ track, width = 128, height = 30 }) {
     <svg class="sparkline" width={width} height={height} aria-hidden="true">
       <path d={`M0 ${Math.round(y(0)) + 0.5}H${width}${graticule.join('')}`} />
       <path class="modelled" d={lineOf(2)} />
-      <path class="measured" d={lineOf(1)} />
+      <path class="measured" stroke-width="1.5" d={lineOf(1)} />
     </svg>
   );
 }

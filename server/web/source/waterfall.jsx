@@ -47,13 +47,8 @@ function rowsOf(terms, total, measured) {
   return { rows, sum: at, absent: absent.map(([term]) => termName(term).toLowerCase()) };
 }
 
-function colourOf(row) {
-  if (row.total) return row.key;
-  if (row.key === 'unexplained') return 'unexplained';
-  return row.change < 0 ? 'good' : 'out';
-}
-
 function Bar({ row, x, end }) {
+  const colour = row.total || row.key === 'unexplained' ? row.key : row.change < 0 ? 'good' : 'out';
   const vertical = (value) => ({ x1: `${x(value)}%`, x2: `${x(value)}%` });
   return (
     <svg class="bar" width="100%" height={rowPx} aria-hidden="true" focusable="false">
@@ -61,7 +56,7 @@ function Bar({ row, x, end }) {
       <line class="goal" {...vertical(end)} y1="0" y2={rowPx} />
       {row.key !== 'battery' && <line class="step" {...vertical(row.to)} y1={rowPx - 7} y2={rowPx} />}
       <rect
-        class={`account ${colourOf(row)}`}
+        class={`account ${colour}`}
         x={`${Math.min(x(row.from), x(row.to))}%`}
         y="7"
         width={`${Math.max(Math.abs(x(row.to) - x(row.from)), 0.15)}%`}

@@ -160,17 +160,14 @@ export function Guard({ children }) {
 
 // Ids, or [id, name], as options of a choice; drawn again only when they change, not with every live value.
 export const Options = ({ of }) =>
-  useMemo(
-    () =>
-      of
-        .map((each) => (Array.isArray(each) ? each : [each, each]))
-        .map(([id, name]) => (
-          <option key={id} value={id}>
-            {name}
-          </option>
-        )),
-    [of.join('\n')],
-  );
+  useMemo(() => {
+    const pairs = of.map((each) => [each].flat());
+    return pairs.map(([id, name = id]) => (
+      <option key={id} value={id}>
+        {name}
+      </option>
+    ));
+  }, [of.join('\n')]);
 
 export function useTitleOf(text) {
   document.title = text ? `${text} · joulecast` : 'joulecast';

@@ -89,17 +89,12 @@ function Shown({ of }) {
   const live = useLive();
   const order = orderOf(...useChoices({}), { key: 'robot', down: false });
   const rows = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
+  const title = `${of.node} does not reach the database`;
+  const message = `${of.error}. The data were read ${ago(of.read_s)}.`;
   const leases = sorted(rows, leaseColumns, order);
   return (
     <>
-      {of.error && (
-        <Failure
-          error={{
-            title: `${of.node} does not reach the database`,
-            message: `${of.error}. The data were read ${ago(of.read_s)}.`,
-          }}
-        />
-      )}
+      {of.error && <Failure error={{ title, message }} />}
       <Summary nodes={of.nodes} leases={leases} />
       <TablePanel title="Daemons" class="cluster" columns={nodeColumns(of.node)} rows={of.nodes} />
       <div class="columns">

@@ -144,17 +144,14 @@ function Squares({ map }) {
 
 function Summary({ map }) {
   const tariff = useTariff();
-  const all = map.missions_read === map.missions;
+  const sampled = `${format.fixed(map.missions)}, evenly sampled`;
+  const of = map.missions_read === map.missions ? format.count(map.robots.length, 'robot') : sampled;
   const rows = [
     ['Energy', energy(map.energy_j), worthTexts(tariff, map.energy_j).join(', '), 'measured'],
     ['Distance', format.length(map.distance_m)],
     ['Consumption', consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)],
     ['Ratio', format.fixed(map.ratio, 3), 'while driving'],
-    [
-      'Missions',
-      format.fixed(map.missions_read),
-      `of ${all ? format.count(map.robots.length, 'robot') : `${format.fixed(map.missions)}, evenly sampled`}`,
-    ],
+    ['Missions', format.fixed(map.missions_read), `of ${of}`],
     ['Zones', `${map.zones.length}`, '', map.zones.length > 0 ? 'gap' : ''],
   ];
   return <Readouts large rows={rows} />;

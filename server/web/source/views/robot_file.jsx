@@ -88,9 +88,8 @@ function Input({ of, value, fixed, onChange }) {
   if (of.type === 'number') return <Bounded of={of} label={of.label} value={value} onChange={onChange} />;
   const pair = Array.isArray(value) ? value : [];
   const set = (side, v) => {
-    const next = [pair[0], pair[1]];
-    next[side] = v;
-    onChange(next.every((one) => (one ?? null) === null) ? undefined : next.map((one) => one ?? null));
+    const next = [pair[0] ?? null, pair[1] ?? null].with(side, v ?? null);
+    onChange(next.some((one) => one !== null) ? next : undefined);
   };
   return ['right', 'left'].map((name, side) => (
     <Bounded
