@@ -5,8 +5,7 @@ import { digits, fixed, known, none } from './format.js';
 const units = { Wh: { Wh: 3600, kWh: 3.6e6 }, J: { J: 1, kJ: 1e3, MJ: 1e6 } };
 const choice = keptChoice('energy_unit', ['Wh', 'J'], () => 'Wh');
 
-export const energyUnit = choice.get;
-export const useEnergyUnit = choice.use;
+export const { get: energyUnit, use: useEnergyUnit } = choice;
 export const toggleEnergyUnit = () => choice.set(choice.get() === 'Wh' ? 'J' : 'Wh');
 
 const decimals = (value, significant) =>

@@ -13,12 +13,11 @@ import { Answer, Button, Empty, Guard, useTitleOf } from './widgets.jsx';
 
 let loaded = null;
 
-function loadStyle() {
-  const link = Object.assign(document.createElement('link'), { rel: 'stylesheet', href: 'views.css' });
-  const style = new Promise((resolve, reject) => Object.assign(link, { onload: resolve, onerror: reject }));
-  document.head.append(link);
-  return style;
-}
+const loadStyle = () =>
+  new Promise((onload, onerror) => {
+    const link = { rel: 'stylesheet', href: 'views.css', onload, onerror };
+    document.head.append(Object.assign(document.createElement('link'), link));
+  });
 
 async function load() {
   try {

@@ -52,9 +52,11 @@ function Bar({ row, x, end }) {
   const vertical = (value) => ({ x1: `${x(value)}%`, x2: `${x(value)}%` });
   return (
     <svg class="bar" width="100%" height={rowPx} aria-hidden="true" focusable="false">
-      <line class="zero" {...vertical(0)} y1="0" y2={rowPx} />
-      <line class="goal" {...vertical(end)} y1="0" y2={rowPx} />
-      {row.key !== 'battery' && <line class="step" {...vertical(row.to)} y1={rowPx - 7} y2={rowPx} />}
+      <line stroke="var(--line)" {...vertical(0)} y1="0" y2={rowPx} />
+      <line stroke="var(--measured)" stroke-dasharray="2 3" {...vertical(end)} y1="0" y2={rowPx} />
+      {row.key !== 'battery' && (
+        <line stroke="var(--muted)" {...vertical(row.to)} y1={rowPx - 7} y2={rowPx} />
+      )}
       <rect
         class={`account ${colour}`}
         x={`${Math.min(x(row.from), x(row.to))}%`}

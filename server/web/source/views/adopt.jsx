@@ -128,11 +128,7 @@ function optionsOf({ id: first, instead }) {
 function changesFor(job, robot, chosen) {
   if (chosen.length === 0) return changesOf(job.model, robot?.model);
   const all = job.result.adoption.effects.flatMap((e) => [e, ...e.instead]);
-  const rowOf = (id, [name, value]) => ({
-    key: `effects.${id}.${name}`,
-    from: null,
-    to: format.digits(value, 4),
-  });
+  const rowOf = (id, [name, to]) => ({ key: `effects.${id}.${name}`, from: null, to: format.digits(to, 4) });
   return chosen.flatMap((id) =>
     Object.entries(all.find((e) => e.id === id)?.parameters ?? {}).map((parameter) => rowOf(id, parameter)),
   );

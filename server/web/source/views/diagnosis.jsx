@@ -97,11 +97,9 @@ function FloorFigure({ floor, effects }) {
     };
     return { cells: rowsOf(columns), bounds, cell_m: side, zones: zonesOf(effects) };
   }, [floor]);
-  const choice = effects.length > 0 && (
-    <Choice label="Model" options={states} value={shown} onChange={show} />
-  );
+  const aside = effects.length > 0 && <Choice label="Model" options={states} value={shown} onChange={show} />;
   return (
-    <Panel title="Where on the floor" aside={choice}>
+    <Panel title="Where on the floor" aside={aside}>
       <FloorCanvas
         key={shown}
         map={map}
@@ -253,6 +251,7 @@ function region(w) {
 
 function WhereBar({ of: w, most }) {
   const at = (value) => `${(100 * Math.min(most, Math.max(0, value))) / most}%`;
+  const time = w.time_share;
   const ends = w.ci.map(Math.abs).sort((a, b) => a - b);
   return (
     <svg width="100%" height="16" aria-hidden="true">
@@ -264,9 +263,9 @@ function WhereBar({ of: w, most }) {
         class={`account ${w.share < 0 ? 'good' : 'gap'}`}
         opacity={w.share < 0 ? 1 : 0.75}
       />
-      <line x1={at(ends[0])} x2={at(ends[1])} y1="8" y2="8" class="whisker" />
-      {format.known(w.time_share) && (
-        <line x1={at(w.time_share)} x2={at(w.time_share)} y1="0" y2="16" class="time-share" />
+      <line x1={at(ends[0])} x2={at(ends[1])} y1="8" y2="8" stroke="var(--ink)" stroke-width="1.5" />
+      {format.known(time) && (
+        <line x1={at(time)} x2={at(time)} y1="0" y2="16" stroke="var(--ink)" stroke-width="2" />
       )}
     </svg>
   );

@@ -164,6 +164,7 @@ export function Mission({ id, given }) {
   const robotId = mission.value?.robot_id;
   const model = useModels(robotId ? [robotId] : []).get(robotId);
   const { covariates = [], next_cursor: more } = conditions.value ?? {};
+  const changes = covariates.reduce((n, c) => n + c.value.length, 0);
   useTitleOf(mission.value?.mission_id ?? 'Mission');
   const missing = (
     <Empty title={`There is no mission ${id}`}>
@@ -206,11 +207,7 @@ export function Mission({ id, given }) {
               {covariates.length > 0 && (
                 <Panel title="Conditions">
                   <Facts rows={conditionsOf(covariates)} />
-                  {more !== null && (
-                    <p class="note foot">
-                      Of the first {covariates.reduce((n, c) => n + c.value.length, 0)} changes.
-                    </p>
-                  )}
+                  {more !== null && <p class="note foot">Of the first {changes} changes.</p>}
                 </Panel>
               )}
             </div>

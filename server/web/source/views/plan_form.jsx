@@ -121,7 +121,7 @@ function Leg({ leg, number, count, faulty, change, move, remove }) {
       </select>
       <span class="leg-fields">
         {Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (
-          <label key={key} class="inline">
+          <label key={key} class="row" style={{ display: 'inline-flex', gap: '4px', marginRight: '4px' }}>
             <span class="hidden">{`Leg ${number}, ${field.label}`}</span>
             <NumberInput
               style={{ width: '62px' }}
@@ -135,7 +135,7 @@ function Leg({ leg, number, count, faulty, change, move, remove }) {
           </label>
         ))}
       </span>
-      <span class="row leg-tools">
+      <span class="row leg-tools" style={{ marginLeft: 'auto' }}>
         {tool('↑', number === 1, () => move(-1), plain(`Move leg ${number} up`))}
         {tool('↓', number === count, () => move(1), plain(`Move leg ${number} down`))}
         {tool('×', count === 1, remove, plain(`Remove leg ${number}`))}

@@ -161,7 +161,9 @@ export function Front({ answer, take }) {
           </span>
           ; {priceOfHaste(point, answer.certificate.shortest_time_s)}
         </span>
-        <Button onClick={() => take(point)}>Use as deadline</Button>
+        <Button style={{ marginLeft: 'auto' }} onClick={() => take(point)}>
+          Use as deadline
+        </Button>
       </div>
     </>
   );

@@ -276,8 +276,8 @@ function Siblings({ siblings, id }) {
           ],
           bar: (
             <svg width="100%" height="16" aria-hidden="true">
-              <line x1="50%" x2="50%" y1="0" y2="16" class="one" />
-              <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" class="whisker" />
+              <line x1="50%" x2="50%" y1="0" y2="16" stroke="var(--line)" />
+              <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" stroke="var(--ink)" stroke-width="1.5" />
               <circle cx={at(s.ratio)} cy="8" r="4" class={`account ${s.stands_out ? 'gap' : 'measured'}`} />
             </svg>
           ),
