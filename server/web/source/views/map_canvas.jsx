@@ -1,7 +1,7 @@
 // The map of a level: its plan, grid and scale, chargers, and what `draw(context, view)` adds.
 import { useEffect, useState } from 'preact/hooks';
 import { idPath } from '../api.js';
-import { FloorView, drawRobot, drawText, fit, pathThrough, strokeBox } from '../floor.jsx';
+import { FloorView, drawRobot, drawText, fit, pathThrough } from '../floor.jsx';
 import { isDark, palette } from '../theme.js';
 import { useNarrow } from '../widgets.jsx';
 
@@ -68,8 +68,12 @@ function drawCharger(c, view, { x_m: x, y_m: y }) {
   const p = palette();
   const [px, py] = view.to(x, y);
   c.fillStyle = p.screen;
-  c.fillRect(px - 8, py - 8, 16, 16);
-  strokeBox(c, p.good, 2, px - 8, py - 8, 16, 16);
+  c.strokeStyle = p.good;
+  c.lineWidth = 2;
+  c.beginPath();
+  c.rect(px - 8, py - 8, 16, 16);
+  c.fill();
+  c.stroke();
   c.fillStyle = p.good;
   c.translate(px, py);
   pathThrough(c, 1, -6, -4, 1, -0.5, 1, -1, 6, 4, -1, 0.5, -1);
