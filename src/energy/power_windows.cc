@@ -14,6 +14,10 @@ namespace {
 constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t most_windows = 3000;  // more add little information and make a fit slow
 constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
+// Rows as far apart as this show parts of a ramp: the motion is then known between rows only.
+constexpr double far_apart_s = 0.125;
+constexpr std::size_t rows_a_window = 4;
+constexpr double turning_rad_s = 0.10, still_rad_s = 0.03;  // of single rows, and of the mean of four
 
 // Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
 // assumed, on the wide side. Parameters that the recordings show well do not depend on them.
@@ -38,14 +42,65 @@ dynamics::ActiveEffect effect_of(std::string_view id, double strength) {
   return effect;
 }
 
+double power_w(const signals::Sample& s) {
+  return s.battery_voltage_v * s.battery_current_a;
+}
+
 double turning_arm(const robot::RobotModel& robot) {
   return robot.kinematics.wheel_radius_m / (2 * robot.kinematics.half_track_m);
+}
+
+// Windows of three intervals between rows, about the same instants. Speeds change linearly from row to row,
+// and a row's power is the mean of a period that begins `phase` of a period before the row: 1 stands for a
+// mean since the last row, 0.5 for one about the row or for its instant.
+std::vector<windows::Window> between_rows(std::span<const telemetry::Recording> missions,
+                                          std::vector<windows::Window> windows, double phase) {
+  constexpr std::size_t intervals = std::tuple_size_v<decltype(windows::Window::part_weight)>;
+  std::erase_if(windows, [&](windows::Window& w) {
+    const std::vector<signals::Sample>& rows = missions[w.mission].samples;
+    const auto time_s = [&](const signals::Sample& s) {
+      return 1e-6 * static_cast<double>(s.utime_us - rows.front().utime_us);
+    };
+    const auto begin = std::ranges::lower_bound(
+        rows, w.t_s - intervals * w.length_s / (2 * rows_a_window) - 1e-3, {}, time_s);
+    const auto first = static_cast<std::size_t>(begin - rows.begin());
+    if (first + intervals >= rows.size()) return true;
+    const double whole_s = time_s(rows[first + intervals]) - time_s(rows[first]);
+    w.reading = true;
+    w.battery_power_w = 0;
+    w.speed_rad_s = w.acceleration_rad_s2 = {};
+    for (std::size_t part = 0; part < intervals; ++part) {
+      const signals::Sample &before = rows[first + part], &after = rows[first + part + 1];
+      const double step_s = time_s(after) - time_s(before), share = step_s / whole_s;
+      w.part_weight[part] = share;
+      w.battery_power_w += share * (phase * power_w(after) + (1 - phase) * power_w(before));
+      for (const std::size_t side : {0u, 1u}) {
+        const double from = before.wheel_velocity_rad_s[side], to = after.wheel_velocity_rad_s[side];
+        w.part_speed_rad_s[part][side] = (from + to) / 2;
+        w.part_acceleration_rad_s2[part][side] = (to - from) / step_s;
+        w.speed_rad_s[side] += share * (from + to) / 2;
+        w.acceleration_rad_s2[side] += (to - from) / whole_s;
+      }
+    }
+    for (const std::size_t side : {0u, 1u}) {
+      double least = std::numeric_limits<double>::infinity(), most = -least;
+      for (const signals::Sample& s : std::span(rows).subspan(first, intervals + 1)) {
+        least = std::min(least, s.wheel_velocity_rad_s[side]);
+        most = std::max(most, s.wheel_velocity_rad_s[side]);
+      }
+      w.moving[side] = least > turning_rad_s || most < -turning_rad_s;
+      w.resting[side] =
+          std::max(most, -least) < turning_rad_s && std::fabs(w.speed_rad_s[side]) < still_rad_s;
+    }
+    return !std::isfinite(w.battery_power_w);
+  });
+  return windows;
 }
 
 }  // namespace
 
 Result<PowerWindows> power_windows(std::span<const telemetry::Recording> missions,
-                                   const robot::RobotModel& robot) {
+                                   const robot::RobotModel& robot, double phase) {
   std::vector<telemetry::Recording> driven;
   for (const telemetry::Recording& mission : missions)
     if (mission.samples.size() > 2) driven.push_back(mission);
@@ -63,7 +118,13 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   // Inertias need accelerations of regular windows: a line about a reading attenuates them.
   windows::Readings regular = p.readings;
   regular.battery_power = false;
+  const bool far = p.readings.row_s > far_apart_s && !p.readings.battery_held;
+  if (far) settings.fewest_samples = rows_a_window;
   p.windows = windows::make_windows(driven, robot, regular, settings);
+  if (far) {
+    p.windows = between_rows(driven, std::move(p.windows), phase);
+    p.phase = phase;
+  }
   std::erase_if(p.windows, [](const windows::Window& w) { return !std::isfinite(w.battery_power_w); });
   std::vector<double> length_s;
   for (const telemetry::Recording& run : driven) length_s.push_back(telemetry::length_s(run));
@@ -76,6 +137,22 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
                               std::to_string(fewest_windows) + " windows and " +
                               std::to_string(fewest_blocks) + " blocks are needed");
   return p;
+}
+
+std::vector<telemetry::Recording> every_second_row(std::span<const telemetry::Recording> missions,
+                                                   double phase) {
+  std::vector<telemetry::Recording> thinned(missions.begin(), missions.end());
+  for (telemetry::Recording& mission : thinned) {
+    std::vector<signals::Sample> rows;
+    for (std::size_t k = 1; k + 1 < mission.samples.size(); k += 2) {
+      signals::Sample& row = rows.emplace_back(mission.samples[k]);
+      row.battery_current_a = (phase * power_w(mission.samples[k - 1]) + power_w(mission.samples[k]) +
+                               (1 - phase) * power_w(mission.samples[k + 1])) /
+                              (2 * row.battery_voltage_v);
+    }
+    mission.samples = std::move(rows);
+  }
+  return thinned;
 }
 
 PowerScale scale_of(std::span<const windows::Window> windows) {
@@ -266,12 +343,18 @@ Result<RegressionComparison> compare_with_regression(std::span<const telemetry::
                                                      const robot::RobotModel& corrected) {
   TRY_ASSIGN(const auto by_file, dynamics::drive_model(file));
   TRY_ASSIGN(const auto by_corrected, dynamics::drive_model(corrected));
-  TRY_ASSIGN(const auto learnt, power_windows(learnt_from, file));
-  TRY_ASSIGN(const auto held_back, power_windows(tested, file));
-  const PlainRegression regression(learnt.windows, file);
-  MissedPowerMeter missed;
-  for (const windows::Window& w : held_back.windows) missed.add(w, by_file, by_corrected, regression);
-  return RegressionComparison{held_back.windows.size(), missed.value()};
+  std::optional<RegressionComparison> best;
+  for (const double phase : row_phases) {
+    TRY_ASSIGN(const auto learnt, power_windows(learnt_from, file, phase));
+    TRY_ASSIGN(const auto held_back, power_windows(tested, file, phase));
+    const PlainRegression regression(learnt.windows, file);
+    MissedPowerMeter missed;
+    for (const windows::Window& w : held_back.windows) missed.add(w, by_file, by_corrected, regression);
+    if (!best || missed.value().corrected < best->missed.corrected)
+      best = RegressionComparison{held_back.windows.size(), missed.value()};
+    if (std::isnan(learnt.phase)) break;
+  }
+  return *best;
 }
 
 WheelInertia wheel_inertia(const robot::RobotModel& robot) {

@@ -128,11 +128,22 @@ struct PowerWindows {
   std::vector<bool> whole;  // each wheel moves or rests throughout: the model is sure of the friction's sign
   std::size_t blocks = 0;   // numbered with time
   windows::Readings readings;
+  double phase = windows::missing;  // of row_phases, where rows are far apart
 };
 
-// Fault::invalid where battery power is not measured, or too little of it.
+// Where rows are so far apart that the motion is known between them only: part of a period by which the mean
+// that a row's power stands for begins before the row. Loggers read or average everything at once, or they
+// average power since their last row.
+inline constexpr std::array row_phases{0.5, 1.0};
+
+// `phase` is of no account where rows are near. Fault::invalid where battery power is not measured, or too
+// little of it.
 Result<PowerWindows> power_windows(std::span<const telemetry::Recording> missions,
-                                   const robot::RobotModel& robot);
+                                   const robot::RobotModel& robot, double phase);
+
+// The recordings with half of their rows; the power of each is the mean over its doubled period.
+std::vector<telemetry::Recording> every_second_row(std::span<const telemetry::Recording> missions,
+                                                   double phase);
 
 PowerScale scale_of(std::span<const windows::Window> windows);
 

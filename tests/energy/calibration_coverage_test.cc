@@ -22,11 +22,12 @@ using trial::foreign::ForeignRobot;
 using virtual_robot::Rng;
 
 constexpr std::size_t missions_of_each = 8;
-constexpr double rows_s = 0.02;
+constexpr double rows_s = 0.02, slow_rows_s = 0.5;
 
 // When the logger reads: at moments of its own, or always at the controller's.
 enum class Phase { free, locked };
-enum class Channels { motors, battery };
+// Slow battery: half a second apart, with the mean power since the last row.
+enum class Channels { motors, battery, slow_battery };
 
 struct MadeRobot {
   robot::RobotModel file;
@@ -46,10 +47,12 @@ void record_mission(const ForeignRobot& built, const trial::foreign::Departures&
   constexpr double state_s = 5e-4;
   const auto states = driven(today, with, drive, state_s, state_s);
   const auto start_us = 1'750'000'000'000'000 + static_cast<std::int64_t>(number) * 600'000'000;
-  for (double t = 0;; t += rows_s) {
+  const bool slow = channels == Channels::slow_battery;
+  for (double t = slow ? slow_rows_s : 0;; t += slow ? slow_rows_s : rows_s) {
     // Free moments lie in the middle of a millisecond, so that their mean is the middle of a controller's
     // period.
-    const double at = phase == Phase::locked ? t : t + 1e-3 * (0.5 + static_cast<double>(rng.index(10)));
+    const double at =
+        phase == Phase::locked || slow ? t : t + 1e-3 * (0.5 + static_cast<double>(rng.index(10)));
     const auto k = static_cast<std::size_t>(std::lround(at / state_s));
     if (k >= states.size()) break;
     const trial::foreign::ForeignState& s = states[k];
@@ -60,10 +63,18 @@ void record_mission(const ForeignRobot& built, const trial::foreign::Departures&
       sample.wheel_velocity_rad_s[side] = s.wheel_rad_s[side] + 0.01 * rng.normal();
     sample.battery_voltage_v = s.battery_voltage_v + 0.01 * rng.normal();
     sample.battery_current_a = s.battery_current_a + 0.02 * rng.normal();
+    if (slow) {
+      double power_w = 0;
+      const auto states_a_row = static_cast<std::size_t>(std::lround(slow_rows_s / state_s));
+      for (std::size_t j = k + 1 - states_a_row; j <= k; ++j)
+        power_w +=
+            states[j].battery_voltage_v * states[j].battery_current_a / static_cast<double>(states_a_row);
+      sample.battery_current_a = power_w / sample.battery_voltage_v + 0.02 * rng.normal();
+    }
     sample.pose = {s.x_m, s.y_m, s.heading_rad};
     sample.payload_kg = drive.payload_kg;
     for (const std::size_t side : {0u, 1u}) {
-      if (channels == Channels::battery) break;
+      if (channels != Channels::motors) break;
       sample.motor_voltage_v[side] = s.voltage_v[side] + 0.05 * rng.normal();
       sample.motor_current_a[side] = s.current_a[side] + noise_a * rng.normal();
     }
@@ -91,7 +102,7 @@ MadeRobot make_robot(std::uint64_t seed, Channels channels, Phase phase = Phase:
     drives.push_back(draw_drive(file, rng.uniform(50, 80), rng));
   // Battery power identifies these effects too; motor channels have no equation for the scrub.
   trial::foreign::Departures with;
-  if (channels == Channels::battery && rng.chance(0.5)) with.scrub = rng.uniform(0, 0.3);
+  if (channels != Channels::motors && rng.chance(0.5)) with.scrub = rng.uniform(0, 0.3);
   if (rng.chance(0.5)) with.driver_loss = rng.uniform(0, 0.08);
   if (rng.chance(0.3)) with.unreturned = rng.uniform(0.2, 1);
   for (const auto& drive : drives) record_mission(built, with, drive, phase, channels, noise_a, rng, made);
@@ -159,6 +170,16 @@ struct Extent {
 
 class CalibrationCoverage : public ::testing::TestWithParam<Extent> {
  protected:
+  Table power_table(Channels channels) const {
+    Table table;
+    for (int n = 1; n <= GetParam().robots; ++n) {
+      const MadeRobot made = make_robot(static_cast<std::uint64_t>(n), channels);
+      const auto found = calibrate_from_power(made.file, made.missions);
+      EXPECT_TRUE(found) << describe(found.error());
+      if (found) count_covered("power", found->estimates, made, table);
+    }
+    return table;
+  }
   void expect_covered(const Table& table) const {
     print_table(table);
     for (const auto& [name, c] : table) {
@@ -186,14 +207,11 @@ TEST_P(CalibrationCoverage, CoversParametersFromMotors) {
 }
 
 TEST_P(CalibrationCoverage, CoversParametersFromPower) {
-  Table table;
-  for (int n = 1; n <= GetParam().robots; ++n) {
-    const MadeRobot made = make_robot(static_cast<std::uint64_t>(n), Channels::battery);
-    const auto found = calibrate_from_power(made.file, made.missions);
-    ASSERT_TRUE(found) << describe(found.error());
-    count_covered("power", found->estimates, made, table);
-  }
-  expect_covered(table);
+  expect_covered(power_table(Channels::battery));
+}
+
+TEST_P(CalibrationCoverage, CoversParametersFromSlowRows) {
+  expect_covered(power_table(Channels::slow_battery));
 }
 
 // A voltage that begins with a controller's period of 10 ms is read together with the last period's current.
