@@ -55,6 +55,16 @@ TEST(VerdictText, OmitsReasonsOfSureVerdicts) {
   EXPECT_THAT(said_of(with_effect(Verdict::none)), IsEmpty());
 }
 
+TEST(VerdictText, NamesTermBesideNoGap) {
+  Diagnosis d = with_effect(Verdict::none);
+  d.baseline = baseline(0.02, 0.01, 0.01);
+  d.baseline->terms = {{"v^2", "W per (m/s)^2", 1.31, 0.55, 1.58}, {"v a", "kg", 16.681, 0.067, 14.665}};
+  EXPECT_THAT(said_of(d), ElementsAre("No gap that matters, although the term v a of power is 16.681 ± 0.067 "
+                                      "kg in the data and 14.7 in the robot file."));
+  d.baseline->terms[1].value = 14.9;
+  EXPECT_THAT(said_of(d), IsEmpty());
+}
+
 TEST(VerdictText, NamesChannelAndVariableOutside) {
   Diagnosis d = with_effect(Verdict::outside);
   d.outside = outside_of("wheel_torque", "wheel_angle");

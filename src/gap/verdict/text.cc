@@ -19,6 +19,7 @@ constexpr double notable_outside = 0.3;   // probability of an unknown cause tha
 constexpr double notable_rest = 2;        // residual over noise, the same
 constexpr double notable_scatter = 0.45;  // of a strength
 constexpr double notable_gap = 0.012;     // of the power, beyond the noise floor
+constexpr double notable_term = 5;        // standard errors of a regression's term from the model's
 
 std::string channel_words(std::string_view channel) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 6> words{
@@ -71,7 +72,10 @@ class Reasons {
           d_.motor_channels ? "torques" : "voltages");
       return said_;
     }
-    if (d_.verdict == Verdict::none) return said_;
+    if (d_.verdict == Verdict::none) {
+      strongest_term();
+      return said_;
+    }
     if (const double sound = sound_readings(d_.checks); sound < posterior::named)
       say("{}: see the checks", error_words(sound));
     if (d_.verdict == Verdict::not_this_robot)
@@ -136,6 +140,17 @@ class Reasons {
     if (e.varies > notable_scatter)
       say("the strength of {} varies by {} of its mean during the recordings", words_of(e.id),
           percent(e.varies));
+  }
+
+  void strongest_term() {
+    if (!d_.baseline) return;
+    const auto off = [](const BaselineTerm& t) { return std::fabs(t.value - t.model) / t.deviation; };
+    const BaselineTerm* most = nullptr;
+    for (const BaselineTerm& t : d_.baseline->terms)
+      if (off(t) > (most ? off(*most) : notable_term)) most = &t;
+    if (most)
+      say("no gap that matters, although the term {} of power is {} in the data and {} in the robot file",
+          most->name, with_deviation(most->value, most->deviation, most->unit), brief(most->model));
   }
 
   void regression() {
