@@ -161,10 +161,10 @@ void add_calibrate(CLI::App& program, Exit& exit) {
       "full discharge, pulses and constant currents",
       run_calibrate,
       {{"recordings", &O::sources,
-        "CSV files, a folder of one battery's tests, or the common beginning of their names: "
-        "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is left for battery predict. "
-        "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
-        "open-circuit voltage",
+        "CSV files, a folder of one battery's tests (alike up to the first _ of their names), or the common "
+        "beginning of their names: <beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is "
+        "left for battery predict. Each test begins full and at rest. The slowest full discharge, under any "
+        "name, gives the open-circuit voltage",
         file_of("csv"), required},
        {"--capacity-ah", &O::rated_capacity_ah, "rated capacity, Ah; determines an ageing factor",
         positive()},

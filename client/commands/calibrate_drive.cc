@@ -224,9 +224,10 @@ void print(const energy::DriveCalibration& fit) {
              fit.torque_rms_nm);
   if (fit.electrical_delay_s != 0)
     fmt::print(
-        "Voltages and currents are {:.1f} ms apart, as if read at one phase of a controller's period. Record "
-        "their means; the standard errors of the inertias include this error.\n",
-        1e3 * std::fabs(fit.electrical_delay_s));
+        "The voltages fit the currents and the speeds of {:.1f} ms {}: one of them is of another instant, as "
+        "a mean beside a reading, or a reading at one phase of a controller's period. Record means over the "
+        "same interval; the standard errors of the inertias include this error.\n",
+        1e3 * std::fabs(fit.electrical_delay_s), fit.electrical_delay_s > 0 ? "later" : "earlier");
 }
 
 void print(const energy::PowerCalibration& fit) {

@@ -317,7 +317,8 @@ void print_back_test(const Json& test, const std::string& unit) {
   fall("energy error", "error_before", "error_after", "improvement_ci");
   fall("power gap", "power_gap_before", "power_gap_after", "power_gap_fall_ci");
   if (member_at(test, "voltage_gap_before").is_number())
-    fall("voltage gap", "voltage_gap_before", "voltage_gap_after", "voltage_gap_fall_ci");
+    fall("gap of the battery voltage's changes", "voltage_gap_before", "voltage_gap_after",
+         "voltage_gap_fall_ci");
   fmt::print("{}\n", test.value("improves", false) ? "it improves" : "no improvement is shown");
 }
 
