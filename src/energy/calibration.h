@@ -66,9 +66,9 @@ struct DriveCalibration {
   double slowest_rad_s = 0, fastest_rad_s = 0;
   double voltage_rms_v = 0;  // residual of the electrical equation (NaN: voltage not measured)
   double torque_rms_nm = 0;  // residual of the torque equation
-  // By which voltages are newer than the speeds (and than currents that are of the speeds' instant), where that
-  // is certain and changes the resistance; else 0. Readings at one phase of a controller's period differ so, and
-  // means beside instantaneous readings. The inertias' errors contain its effect.
+  // By which voltages are newer than the speeds (and than currents that are of the speeds' instant), where
+  // that is certain and changes the resistance; else 0. Readings at one phase of a controller's period differ
+  // so, and means beside instantaneous readings. The inertias' errors contain its effect.
   double electrical_delay_s = 0;
 };
 
