@@ -24,8 +24,8 @@
 
 // The commands token, key and audit. token creates and revokes the tokens of joulecastd's auth.token_file. It
 // writes the file, not the store, which a running daemon locks; it works with and without one, and the first
-// token requires none. key does so for the keys by which robots sign their telemetry, in the file of
-// joulecastd's ingest.key_file.
+// token requires none. key creates, lists and revokes the keys by which robots sign their telemetry, in
+// joulecastd's ingest.key_file. audit lists and verifies the audit of a store.
 namespace joulecast::client {
 namespace {
 

@@ -82,7 +82,7 @@ history::MissionSort sort_of(const Request& request) {
   return sort;
 }
 
-// Columns of missions and of sums over them, with the common ones between the others.
+// The columns that missions and sums over them have in common, behind a blank.
 const std::string account_columns =
     " ratio wh_per_km energy/battery_j energy/measured_j energy/measured_s energy/modelled_j "
     "energy/unexplained_j energy/drawn_j energy/returned_j energy/charge_ah energy/distance_m "

@@ -22,6 +22,8 @@
 #include "signals/ids.h"
 #include "telemetry/validation.h"
 
+// One mission: its accounts, ledger, trace, telemetry and covariates; its annulment; requests to begin or end
+// one.
 namespace joulecast::api {
 namespace {
 

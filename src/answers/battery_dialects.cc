@@ -146,6 +146,7 @@ const auto ros_table =
 // Of each Dialect but this service's own.
 constexpr const Table<BatteryStatus>* dialect_tables[] = {nullptr, &vda5050_3_0_table, &vda5050_2_1_table,
                                                           &massrobotics_table, &ros_table};
+static_assert(std::size(dialect_tables) == std::size(dialect_names));
 
 }  // namespace
 

@@ -1,8 +1,10 @@
 #include "answers/profile.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <ranges>
 #include <utility>
 
 #include "answers/mission.h"

@@ -45,9 +45,8 @@ std::string among(const std::string& column, std::size_t values) {
 }
 
 std::string ratio_sql() {
-  return "(CASE WHEN measured_s > 0 AND measured_j - ledger_unexplained_j > 0 THEN measured_j / (measured_j "
-         "- "
-         "ledger_unexplained_j) END)";
+  return "(CASE WHEN measured_s > 0 AND measured_j - ledger_unexplained_j > 0 THEN "
+         "measured_j / (measured_j - ledger_unexplained_j) END)";
 }
 
 std::string wh_per_km_sql() {

@@ -90,9 +90,8 @@ class Sums {
 };
 
 std::string select_points() {
-  return "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, x_m, "
-         "y_m "
-         "FROM trace WHERE " +
+  return "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
+         "x_m, y_m FROM trace WHERE " +
          among("mission_key", missions_at_once) +
          " AND x_m IS NOT NULL AND y_m IS NOT NULL ORDER BY mission_key";
 }
