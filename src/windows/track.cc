@@ -107,6 +107,7 @@ class Builder {
     const std::size_t n = mission_.samples.size();
     c.speed[s] = column([s](const Sample& x) { return x.wheel_velocity_rad_s[s]; });
     c.smooth_speed[s] = smoothed(c.time_s, c.speed[s], smooth_s_);
+    if (settings_.half) c.speed[s] = half_of(c.time_s, std::move(c.speed[s]), *settings_.half);
     c.voltage[s] = electrical([s](const Sample& x) { return x.motor_voltage_v[s]; });
     c.current[s] = electrical([s](const Sample& x) { return x.motor_current_a[s]; });
     const std::vector<double> volts = smoothed(c.time_s, c.voltage[s], smooth_s_);
@@ -217,6 +218,15 @@ Line line_at(std::span<const double> time_s, std::span<const double> v, double a
   if (n < fewest || !(spread > 0)) return {};
   const double slope = (n * ty - t * y) / spread;
   return {(y - slope * t) / n, slope};
+}
+
+std::vector<double> half_of(std::span<const double> time_s, std::vector<double> v, std::size_t first) {
+  for (std::size_t k = first + 1; k + 1 < v.size(); k += 2) {
+    const double part = (time_s[k] - time_s[k - 1]) / (time_s[k + 1] - time_s[k - 1]);
+    const double between = std::lerp(v[k - 1], v[k + 1], part);
+    if (std::isfinite(v[k] + between)) v[k] = between;
+  }
+  return v;
 }
 
 double median_period_s(const telemetry::Recording& mission) {

@@ -36,6 +36,11 @@ struct Line {
 Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s,
              double fewest = 3);
 
+// Every other value, from the one of number `first` on (0 or 1); those between are replaced by straight lines
+// where all three were measured. The two halves of a channel have no noise in common that is independent from
+// sample to sample.
+std::vector<double> half_of(std::span<const double> time_s, std::vector<double> v, std::size_t first);
+
 // The median time between samples [s], of which there are at least two.
 double median_period_s(const telemetry::Recording& mission);
 

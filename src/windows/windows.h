@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -74,11 +75,12 @@ std::array<double, 5> plain_terms(const Window& w, double wheel_radius_m);
 
 struct WindowSettings {
   double length_s = 0.4;
-  std::size_t fewest_samples = 8;   // in a window; slow recordings get longer windows
-  double longest_gap_s = 0.25;      // between samples inside a window
-  double span_s = 1.0;              // over which progress by the map is compared
-  double electrical_delay_s = 0;    // by which electrical channels lag; taken out before windowing
-  std::size_t most_windows = 8000;  // beyond it, segments of windows are left out evenly
+  std::size_t fewest_samples = 8;        // in a window; slow recordings get longer windows
+  double longest_gap_s = 0.25;           // between samples inside a window
+  double span_s = 1.0;                   // over which progress by the map is compared
+  double electrical_delay_s = 0;         // by which electrical channels lag; taken out before windowing
+  std::size_t most_windows = 8000;       // beyond it, segments of windows are left out evenly
+  std::optional<std::size_t> half = {};  // the motion by the wheel speeds of half_of() alone
 };
 
 // How the electrical channels were read.

@@ -188,10 +188,12 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.covariates = windows::covariate_names(missions);
   const windows::Readings readings = windows::find_readings(missions);
   d.sample_s = readings.row_s;
-  d.windows = windows::make_windows(missions, robot, readings,
-                                    {.electrical_delay_s = electrical_delay_s, .most_windows = most_windows});
-  std::erase_if(d.windows,
-                [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
+  windows::WindowSettings by{.electrical_delay_s = electrical_delay_s, .most_windows = most_windows};
+  for (std::vector<Window>* made : {&d.windows, &d.halves[0], &d.halves[1]}) {
+    *made = windows::make_windows(missions, robot, readings, by);
+    std::erase_if(*made, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
+    by.half = by.half ? 1 : 0;  // of the next
+  }
   const auto whole = [](const Window& w) { return w.reading || windows::steady(w); };
   if (static_cast<std::size_t>(std::ranges::count_if(d.windows, whole)) < fewest_windows)
     return fail(Fault::invalid, "", "too little known motion");
@@ -214,10 +216,9 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
     const double mean_v = tracks.back().mean_battery_voltage_v;
     voltage_v.push_back(std::isfinite(mean_v) ? mean_v : robot.battery.nominal_voltage_v);
   }
-  for (Window& w : d.windows) {
-    d.battery_voltage_v.push_back(w.battery_voltage_v);
-    w.battery_voltage_v = voltage_v[w.mission];
-  }
+  for (const Window& w : d.windows) d.battery_voltage_v.push_back(w.battery_voltage_v);
+  for (std::vector<Window>* windows : {&d.windows, &d.halves[0], &d.halves[1]})
+    for (Window& w : *windows) w.battery_voltage_v = voltage_v[w.mission];
   d.blocks = assign(d.windows, length_s);
   if (d.motors) {
     d.rows = rows_of(d.windows, robot);

@@ -96,7 +96,8 @@ struct Data {
   bool voltages = false;           // of motors without currents were recorded
   double sample_s = 0;             // between samples
   std::vector<Window> windows;     // battery_voltage_v is the mission's mean: no regressor has its noise
-  std::vector<double> battery_voltage_v;  // measured, of each window
+  std::array<std::vector<Window>, 2> halves;  // the same by half_of(): of the residuals, and of the columns
+  std::vector<double> battery_voltage_v;      // measured, of each window
   PowerRows rows;
   double mean_power_w = 1;
   std::size_t fewest = fewest_rows;  // fewest rows of a channel

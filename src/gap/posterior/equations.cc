@@ -193,7 +193,7 @@ class Builder {
     const std::size_t n = d_.windows.size();
     std::vector<ChannelValues<double>> values(n);
     for (std::size_t k = 0; k < n; ++k) {
-      values[k] = residuals(model_, d_.windows[k], d_.voltages);
+      values[k] = residuals(model_, d_.halves[0][k], d_.voltages);
       // The expected reading contains the mean voltage; the response contains the measured one.
       values[k][index_of(Channel::battery_voltage)] +=
           d_.battery_voltage_v[k] - d_.windows[k].battery_voltage_v;
@@ -227,7 +227,7 @@ class Builder {
     }
     for (std::size_t j = 0; j < e_.effects; ++j) {
       for (std::size_t k = 0; k < n; ++k) {
-        const ChannelValues<Dual> r = residuals(models_[j], d_.windows[k], d_.voltages);
+        const ChannelValues<Dual> r = residuals(models_[j], d_.halves[1][k], d_.voltages);
         const double times = c_.columns[j].by ? c_.columns[j].by->of(d_.windows[k]) : 1.0;
         for (Made& made : all) {
           for (std::size_t s = 0; s < made.row.size(); ++s) {
@@ -248,7 +248,7 @@ class Builder {
               made.x.row(at).segment(ix(e_.function_columns[f][0]), ix(f_[f].size())) =
                   f_[f].basis[s].row(ix(k));
           }
-          add_nuisances(made.rows.channel, s, d_.windows[k], made.x, at);
+          add_nuisances(made.rows.channel, s, d_.halves[1][k], made.x, at);
         }
       }
       keep(std::move(made.rows), made.x);

@@ -262,7 +262,7 @@ std::vector<Function> make_functions(const Data& d) {
           {Channel::power, name, {of_rows.rowwise() - of_rows.colwise().mean(), {}}, d.mean_power_w});
     }
   } else if (d.motors) {
-    add_motor_functions(d, Variables(d, d.windows), out);
+    add_motor_functions(d, Variables(d, d.halves[1]), out);
   }
   return out;
 }

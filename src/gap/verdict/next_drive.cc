@@ -126,7 +126,7 @@ statistics::Information expected_information(const posterior::Fit& fit, const st
   drive.voltages = fit.data.voltages;
   drive.sample_s = fit.data.sample_s;
   drive.mean_power_w = fit.data.mean_power_w;
-  drive.windows = windows;
+  drive.windows = drive.halves[0] = drive.halves[1] = windows;
   drive.battery_voltage_v.assign(windows.size(), windows.front().battery_voltage_v);
   for (const Window& w : windows) {
     drive.rows.instants.push_back(w);
