@@ -285,7 +285,9 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
   const int width = outcome.by_motors ? 26 : 32;
   for (const energy::ParameterEstimate& e : outcome.estimates()) {
     fmt::print("{:<{}} {:>12.5g}", e.name, width, e.value);
-    e.fitted ? fmt::print(" ± {:<10.3g}", e.standard_error) : fmt::print(" {:<13}", "(held)");
+    // A value that battery power does not identify is an estimate too, with a large error.
+    const bool estimated = e.fitted || (outcome.by_power && e.standard_error > 0);
+    estimated ? fmt::print(" ± {:<10.3g}", e.standard_error) : fmt::print(" {:<13}", "(held)");
     fmt::print(" {:<10} {}\n", e.unit, e.note);
   }
   outcome.by_motors ? print(*outcome.by_motors) : print(*outcome.by_power);
