@@ -106,8 +106,9 @@ export function useRead(read, path, renewed, everyMs) {
 
 export const useGet = (path, ...more) => useRead((signal) => get(path, signal), path, ...more);
 
-// What `read()` returns; drawn again when that changes with the event of `target`. A layout effect, so that a
-// change before the first paint is noticed.
+// What `read()` returns; drawn again when that changes with the event of `target`. `read` and `target` must
+// not depend on props: those of the first drawing are kept. A layout effect, so that a change before the
+// first paint is noticed.
 export function useSource(read, target, event = 'change') {
   const [value, setValue] = useState(read);
   useLayoutEffect(() => {

@@ -8,7 +8,10 @@ import { Button } from './widgets.jsx';
 export function Dialog({ open, title, action, onSubmit, onClose, children, ...more }) {
   const dialog = useRef(null);
   // Shown with its content, so that a control in it gets the focus.
-  useEffect(() => dialog.current[open ? 'showModal' : 'close'](), [open]);
+  useEffect(() => {
+    if (open) dialog.current.showModal();
+    else dialog.current.close();
+  }, [open]);
   const submit = (event) => {
     event.preventDefault();
     onSubmit(Object.fromEntries(new FormData(event.target)));

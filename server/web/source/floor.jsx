@@ -267,7 +267,7 @@ export function FloorPath({ points, kind = 'power', height = 380, label, cursor,
     }
   };
   return (
-    <FloorView {...{ viewFor, draw, height, changes }} aria-label={label}>
+    <FloorView viewFor={viewFor} draw={draw} height={height} changes={changes} aria-label={label}>
       {values.some((value) => value > 0 || kind === 'gap') && (
         <Legend scale={scale} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
       )}

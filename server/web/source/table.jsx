@@ -6,7 +6,7 @@ export const names = new Intl.Collator('en', { numeric: true });
 const absent = (v) => v === null || v === undefined;
 const compare = (a, b) => (typeof a === 'string' ? names.compare(a, b) : a - b);
 
-// A copy of `rows` in the order of the column `sort.key`; rows without a value come last in both directions.
+// A copy of `rows` in the given order, of orderOf(); rows without a value come last in both directions.
 export function sorted(rows, columns, [sort]) {
   const value = columns.find((c) => c.key === sort.key)?.sort;
   if (value === undefined) return rows;
@@ -85,7 +85,7 @@ export const Cells = ({ columns, row }) =>
   );
 
 // columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by};
-// `order`, of orderOf(): of a table that can be sorted. Rows are identified by key, id or robot_id, if any.
+// `order`, of orderOf(): of a table that can be sorted. Rows are identified by key or id, if any.
 export const Table = ({ columns, rows, order, class: name = '' }) => (
   <>
     {order && <SortChoice columns={columns} order={order} />}
@@ -93,7 +93,7 @@ export const Table = ({ columns, rows, order, class: name = '' }) => (
       <Head columns={columns} order={order} />
       <tbody>
         {rows.map((row, k) => (
-          <tr key={row.key ?? row.id ?? row.robot_id ?? k}>
+          <tr key={row.key ?? row.id ?? k}>
             <Cells columns={columns} row={row} />
           </tr>
         ))}

@@ -107,7 +107,13 @@ export const Panel = ({ title, aside, children, class: name, of, ...answer }) =>
       <h2>{title}</h2>
       {aside && <div class="row aside">{aside}</div>}
     </header>
-    {of ? <Answer {...{ of, children, ...answer }} /> : children}
+    {of ? (
+      <Answer of={of} {...answer}>
+        {children}
+      </Answer>
+    ) : (
+      children
+    )}
   </section>
 );
 
@@ -161,8 +167,8 @@ export function Guard({ children }) {
 // Ids, or [id, name], as options of a choice; drawn again only when they change, not with every live value.
 export const Options = ({ of }) =>
   useMemo(() => {
-    const pairs = of.map((each) => [each].flat());
-    return pairs.map(([id, name = id]) => (
+    const pairs = of.map((each) => (Array.isArray(each) ? each : [each, each]));
+    return pairs.map(([id, name]) => (
       <option key={id} value={id}>
         {name}
       </option>

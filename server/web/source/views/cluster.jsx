@@ -88,7 +88,11 @@ const ownFacts = [
 function Shown({ of }) {
   const live = useLive();
   const order = orderOf(...useChoices({}), { key: 'robot', down: false });
-  const rows = of.leases.map((l) => ({ ...l, lag: lagOf(l, live.robots.get(l.robot_id)?.state) }));
+  const rows = of.leases.map((l) => ({
+    ...l,
+    key: l.robot_id,
+    lag: lagOf(l, live.robots.get(l.robot_id)?.state),
+  }));
   const title = `${of.node} does not reach the database`;
   const message = `${of.error}. The data were read ${ago(of.read_s)}.`;
   const leases = sorted(rows, leaseColumns, order);

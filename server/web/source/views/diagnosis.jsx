@@ -176,8 +176,8 @@ const partColumns = [
 ];
 
 function Comparison({ of: c }) {
-  const d = c.difference ?? {};
-  const parts = c.difference && [
+  const d = c.difference;
+  const parts = d && [
     ['motion and load', d.by_motion_j],
     ...Object.entries(d.by_effect_j).map(([id, value]) => [effectName(id), value]),
     ['not explained', d.unexplained_j],
@@ -186,7 +186,13 @@ function Comparison({ of: c }) {
   return (
     <>
       <TablePanel title="Groups" columns={groupColumns} rows={c.groups} />
-      <TablePanel title={`Energy per metre of ${d.to} above ${d.from}`} columns={partColumns} rows={parts} />
+      {d && (
+        <TablePanel
+          title={`Energy per metre of ${d.to} above ${d.from}`}
+          columns={partColumns}
+          rows={parts}
+        />
+      )}
       {c.strengths.map((s) => (
         <TablePanel
           key={s.id}
@@ -514,12 +520,14 @@ export function Result({ result: r, children }) {
         </div>
       )}
       {r.groups && <Comparison of={r} />}
-      <TablePanel
-        title="Runs"
-        columns={runColumns}
-        rows={r.runs}
-        note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter?.run)}.`}
-      />
+      {r.runs && (
+        <TablePanel
+          title="Runs"
+          columns={runColumns}
+          rows={r.runs}
+          note={`Error: measured minus modelled energy, in percent of the measured. Without any cause runs scatter by ${share(r.scatter.run)}.`}
+        />
+      )}
       {r.figures && <Charts result={r} />}
       {!placed && floorOf(r)}
       {readings.length > 0 && (

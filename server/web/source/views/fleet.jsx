@@ -148,10 +148,10 @@ function useWindow(count, heightPx) {
       setRange((before) => (before[0] === first && before[1] === last ? before : [first, last]));
     };
     look();
-    const shown = new AbortController();
-    addEventListener('scroll', look, { passive: true, signal: shown.signal });
-    addEventListener('resize', look, { signal: shown.signal });
-    return () => shown.abort();
+    const listening = new AbortController();
+    addEventListener('scroll', look, { passive: true, signal: listening.signal });
+    addEventListener('resize', look, { signal: listening.signal });
+    return () => listening.abort();
   }, [count, heightPx]);
   return [body, Math.min(range[0], count), Math.min(Math.max(range[1], 0), count)];
 }

@@ -28,14 +28,19 @@ function filterOf(given) {
 }
 
 // What colours show: {title, kind, unit, value(cell)}.
-const inUnits = (value, unit) => (value === null ? null : value / unit);
 const subject = (title, kind, unit, value) => ({ title, kind, unit, value });
 const subjects = {
   energy: () => {
     const { u } = consumption(1);
-    return subject('consumption', 'power', u, (c) => inUnits(c.energy_j_per_m, u === 'J/m' ? 1 : 3.6));
+    const per = u === 'J/m' ? 1 : 3.6;
+    return subject('consumption', 'power', u, (c) =>
+      c.energy_j_per_m === null ? null : c.energy_j_per_m / per,
+    );
   },
-  gap: () => subject('departure from the models', 'gap', '%', (c) => inUnits(c.departure, 0.01)),
+  gap: () =>
+    subject('departure from the models', 'gap', '%', (c) =>
+      c.departure === null ? null : 100 * c.departure,
+    ),
   time: () => subject('time spent', 'power', 'min', (c) => c.covered_s / 60),
 };
 const names = { gap: 'Gap', energy: 'Energy', time: 'Time' };

@@ -87,7 +87,10 @@ function Start({ given }) {
     setBusy(true);
     setError(null);
     const body = { robot_id: chosen, max_missions: Number(missions) };
-    await post('/v1/diagnoses', body).then(({ id }) => void (location.hash = `#/gap/${id}`), setError);
+    const open = ({ id }) => {
+      location.hash = `#/gap/${id}`;
+    };
+    await post('/v1/diagnoses', body).then(open, setError);
     setBusy(false);
   };
   if (live.loaded && robots.length === 0)

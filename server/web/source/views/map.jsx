@@ -138,7 +138,9 @@ function Playback({ given, change, level, image, children }) {
         aside={first && <a href={robotLink(first.mission.robot_id)}>{first.mission.robot_id}</a>}
       >
         <MapCanvas
-          {...{ level, image, draw }}
+          level={level}
+          image={image}
+          draw={draw}
           points={played.flatMap(({ rows }) => rows)}
           changes={[first, other, second]}
           label="Paths of the missions, and where the robots were at the time of the slider"
@@ -308,13 +310,16 @@ function Live({ maps, place, level, image, show, change }) {
       <Panel
         class="screen"
         title={nameOf(JSON.parse(place))}
-        aside={<Choice label="Show" options={layers} {...fieldsOf({ show }, change).of('show')} />}
+        aside={<Choice label="Show" options={layers} value={show} onChange={(to) => change({ show: to })} />}
       >
         {placed.length === 0 && !image ? (
           <Empty title="No robot here reports its position" />
         ) : (
           <MapCanvas
-            {...{ level, image, points, draw }}
+            level={level}
+            image={image}
+            points={points}
+            draw={draw}
             changes={[live.revision, show, zones.value, attention, place]}
             label={`Map with ${placed.length} robots; the table lists them`}
             onPick={pick}
@@ -343,7 +348,8 @@ function Shown({ maps, given, change, reload }) {
   const choice = (
     <SelectField
       label="Map and level"
-      {...fieldsOf({ place }, change).of('place')}
+      value={place}
+      onChange={(to) => change({ place: to })}
       options={all.map((key) => [key, nameOf(JSON.parse(key))])}
     />
   );
@@ -361,7 +367,14 @@ function Shown({ maps, given, change, reload }) {
       ) : (
         <>
           <div class="wrap filters">{choice}</div>
-          <Live {...{ maps, place, level, image, change }} show={given.show ?? 'paths'} />
+          <Live
+            maps={maps}
+            place={place}
+            level={level}
+            image={image}
+            change={change}
+            show={given.show ?? 'paths'}
+          />
         </>
       )}
       <FloorPlanForm key={place} place={{ map, level: floor }} level={level} onChange={stored} />

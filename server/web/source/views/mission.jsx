@@ -130,11 +130,11 @@ function Figures({ mission: m, model }) {
 }
 
 function Comparison({ mission: m, trace }) {
-  const not = (why, title = 'Not compared') => <Empty title={title}>{why}</Empty>;
-  if (m.model_version === null) return not('The robot had no model on this mission.', 'No model');
-  if (m.state === 'open') return not('Compared when the mission ends.', 'Still open');
-  if (m.contradictions.length > 0) return not('The telemetry of this mission is contradicted.');
-  if (m.gap_s > 0) return not(`For ${format.span(m.gap_s)} of the mission there is no telemetry.`);
+  const uncompared = (why, title = 'Not compared') => <Empty title={title}>{why}</Empty>;
+  if (m.model_version === null) return uncompared('The robot had no model on this mission.', 'No model');
+  if (m.state === 'open') return uncompared('Compared when the mission ends.', 'Still open');
+  if (m.contradictions.length > 0) return uncompared('The telemetry of this mission is contradicted.');
+  if (m.gap_s > 0) return uncompared(`For ${format.span(m.gap_s)} of the mission there is no telemetry.`);
   return trace && <LeastEnergy mission={m} trace={trace} />;
 }
 
@@ -164,7 +164,7 @@ export function Mission({ id, given }) {
   const robotId = mission.value?.robot_id;
   const model = useModels(robotId ? [robotId] : []).get(robotId);
   const { covariates = [], next_cursor: more } = conditions.value ?? {};
-  const changes = covariates.reduce((n, c) => n + c.value.length, 0);
+  const counted = covariates.reduce((n, c) => n + c.value.length, 0);
   useTitleOf(mission.value?.mission_id ?? 'Mission');
   const missing = (
     <Empty title={`There is no mission ${id}`}>
@@ -207,7 +207,7 @@ export function Mission({ id, given }) {
               {covariates.length > 0 && (
                 <Panel title="Conditions">
                   <Facts rows={conditionsOf(covariates)} />
-                  {more !== null && <p class="note foot">Of the first {changes} changes.</p>}
+                  {more !== null && <p class="note foot">Of the first {counted} changes.</p>}
                 </Panel>
               )}
             </div>

@@ -213,14 +213,14 @@ function List({ given, list, total, order }) {
   );
 }
 
-export function Missions({ given: begun }) {
-  const [given, change] = useChoices(begun);
+export function Missions({ given: asked }) {
+  const [given, change] = useChoices(asked);
   const filter = useMemo(() => filterOf(given), [given]);
   const order = orderOf(given, change, { key: 'start', down: true });
   const [{ key, down }] = order;
-  const asked = { ...filter, sort: sortNames[key] ?? key, order: down ? 'desc' : 'asc' };
+  const listed = { ...filter, sort: sortNames[key] ?? key, order: down ? 'desc' : 'asc' };
   const none = misordered(given.from, given.to);
-  const list = useNewest(none ? null : '/v1/missions', asked, pageRows);
+  const list = useNewest(none ? null : '/v1/missions', listed, pageRows);
   const totals = useGet(none ? null : `/v1/mission-totals${query(filter)}`);
   const refresh = () => {
     list.reload();
@@ -241,7 +241,7 @@ export function Missions({ given: begun }) {
             <Button href={`#/trends${query({ robot: given.robot })}`}>Trends</Button>
             <Button href="#/trends?of=missions">Compare</Button>
             <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>
-            <Export of={missionFiles(asked)} total={total} disabled={!total} />
+            <Export of={missionFiles(listed)} total={total} disabled={!total} />
           </div>
           <Answer of={list} what="missions">
             {() => <List given={given} list={list} total={total} order={order} />}

@@ -223,7 +223,7 @@ function Place({ id, onError }) {
   );
 }
 
-// After a change of the robot.
+// After the robot is stored or removed: to that view.
 function leave(id, hash) {
   forgetModel(id);
   reloadFleet();
@@ -266,7 +266,6 @@ function Form({ groups, id, stored, begun }) {
   const known = useLive().robots.get(name)?.state.has_model;
   const changes = changesOf(file, stored?.model);
   const doubts = review?.findings.length ?? 0;
-  const doubted = format.count(doubts, 'value is', 'values are');
   const faulty = review === null || review.findings.some((f) => f.fault);
   const barred =
     refusalFor('admin') ??
@@ -321,7 +320,11 @@ function Form({ groups, id, stored, begun }) {
                 ) : (
                   <p>Its energy is modelled from its next mission on.</p>
                 )}
-                {doubts > 0 && <p class="fault">{doubted} implausible; see the review.</p>}
+                {doubts > 0 && (
+                  <p class="fault">
+                    {format.count(doubts, 'value is', 'values are')} implausible; see the review.
+                  </p>
+                )}
               </ConfirmButton>
               {stored && <Remove id={id} onError={setError} />}
             </p>

@@ -192,10 +192,10 @@ function AtCursor({ trace, mission, index }) {
   const measured = trace.measured_power_w;
   const modelled = trace.modelled_power_w;
   const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];
-  const [low, high] = [of(measured.min, format.fixed), of(measured.max, format.fixed)];
+  const band = gap !== null && `${format.fixed(measured.min[at])} to ${format.fixed(measured.max[at])}`;
   const rows = [
     ['Time', at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)],
-    ['Measured', of(measured.mean, format.power), gap !== null && `${low} to ${high}`, 'measured'],
+    ['Measured', of(measured.mean, format.power), band, 'measured'],
     ['Modelled', of(modelled.mean, format.power), '', 'modelled'],
     ['Gap', format.withSign(format.power(gap)), '', 'gap'],
     ['Speed', of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))],
