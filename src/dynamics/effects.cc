@@ -170,8 +170,10 @@ const std::tuple effects{
              "share of T_m and viscous friction that the gear passes on: 0 where "
              "they act at the motor, 1 where at the wheel"}},
            [](const auto& a, auto& p) {
+             // Losses add, each with its own share of friction.
+             const auto of_friction = p.gear_loss * p.gear_friction_share + a[0] * a[1];
              p.gear_loss += a[0];
-             p.gear_friction_share = a[1];
+             p.gear_friction_share = value_of(p.gear_loss) == 0 ? a[1] : of_friction / p.gear_loss;
            }),
     effect("chassis_mass_error", ActsOn::inertia, "m_c (1 + a)", "rigid chassis", "thesis (2-31)",
            {{"ratio", "1", 0, -0.8, 3, "error of the chassis mass over its nominal value"}},

@@ -199,6 +199,24 @@ TEST(TwoEffects, AreIndependentOfOrder) {
   }
 }
 
+TEST(TwoEffects, LossesOfGearsAdd) {
+  const robot::RobotModel robot = testing::nomad();
+  const auto loss_nm = [&](std::vector<std::array<double, 2>> losses) {
+    std::vector<ActiveEffect> gears;
+    for (const auto& [loss, of_friction] : losses) {
+      gears.push_back(initial(*find_effect("gear_efficiency")));
+      gears.back().values[0] = loss;
+      gears.back().values[1] = of_friction;
+    }
+    Instant at;
+    at.wheel_speed_rad_s = {6, 4};
+    at.wheel_acceleration_rad_s2 = {0.5, 0.4};
+    return DriveModel(robot, gears).balance(at).gear_nm[0];
+  };
+  EXPECT_NEAR(loss_nm({{0.04, 0}, {0.01, 1}}), loss_nm({{0.04, 0}}) + loss_nm({{0.01, 1}}), 1e-12);
+  EXPECT_NEAR(loss_nm({{0.04, 1}, {0, 0}}), loss_nm({{0.04, 1}}), 1e-12);
+}
+
 // Effects that share T_m, as described by their parameters' meanings: each scales the contributions of those
 // named in its meaning.
 TEST(TwoEffects, DryFrictionScalesNamedTerms) {

@@ -105,21 +105,33 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
     found.id = id;
     found.probability = std::min(1.0, of_effect[id]);
     std::map<std::string, double> instead;
-    double most = -1;
+    struct Shape {
+      double probability = 0, most = -1;  // of all models with it, of the likeliest of them
+      std::size_t model = 0;
+    };
+    std::map<std::size_t, Shape> shapes;  // by hypothesis
+    const auto place = [&](std::size_t model) {
+      const auto& members = fit.models[model].set;
+      return std::ranges::find(members, id, [&](std::size_t h) { return fit.catalogue.hypotheses[h].id(); }) -
+             members.begin();
+    };
     for (std::size_t k = 0; k < content.size(); ++k) {
       const auto& ids = content[k].ids;
       if (std::ranges::find(ids, id) == ids.end()) {
         for (const std::string& other : ids)
           if (std::ranges::find(set->first, other) == set->first.end()) instead[other] += probability[ix(k)];
-      } else if (probability[ix(k)] > most) {
-        most = probability[ix(k)];
-        found.model = k;
+        continue;
       }
+      Shape& shape = shapes[fit.models[k].set[ux(place(k))]];
+      shape.probability += probability[ix(k)];
+      if (!(probability[ix(k)] > shape.most)) continue;
+      shape.most = probability[ix(k)];
+      shape.model = k;
     }
-    const auto& members = fit.models[found.model].set;
-    const auto place =
-        std::ranges::find(members, id, [&](std::size_t h) { return fit.catalogue.hypotheses[h].id(); });
-    found.member = static_cast<std::size_t>(place - members.begin());
+    const auto shape = std::ranges::max_element(
+        shapes, {}, [](const std::pair<const std::size_t, Shape>& s) { return s.second.probability; });
+    found.model = shape->second.model;
+    found.member = ux(place(found.model));
     found.group = found.probability;
     for (std::size_t n = 0; n < most_alternatives && !instead.empty(); ++n) {
       const auto next = std::ranges::max_element(instead, likelier);

@@ -23,7 +23,7 @@ struct Found {
   double probability = 0;                 // bagged, before constancy
   std::vector<std::string> alternatives;  // that replace it where it is absent
   double group = 0;                       // probability of it or of one of them
-  std::size_t model = 0;                  // the likeliest with it
+  std::size_t model = 0;                  // the likeliest with it in its likeliest shape
   std::size_t member = 0;                 // its place in that model's set
 };
 

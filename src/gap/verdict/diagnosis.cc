@@ -53,6 +53,15 @@ double moved_w(const posterior::Fit& fit, const dynamics::ActiveEffect& effect) 
   return (posterior::predicted_power(fit.data, with) - fit.unchanged_w).cwiseAbs().mean();
 }
 
+// Whether the effect differs from the diagnosed one in its strengths only.
+bool in_shape_of(const robot::AdoptedEffect& effect, const DiagnosedEffect& diagnosed) {
+  const auto info = dynamics::find_effect(effect.id)->info();
+  for (std::size_t k = 1; k < info.parameters.size(); ++k)
+    if (!info.parameters[k].strength && effect.parameters[k].second != diagnosed.parameters[k].value)
+      return false;
+  return true;
+}
+
 }  // namespace
 
 void state_effects(const Explained& answer, double mean_power_w, Diagnosis& d) {
@@ -127,7 +136,7 @@ void state_offer(const posterior::Fit& fit, const Explained& answer, bool other_
     const auto same = std::ranges::find(offered, one.effect.id, [](const Offered& o) { return o.effect.id; });
     if (same == offered.end())
       offered.push_back(std::move(one));
-    else if (same->moved_w < one.moved_w)
+    else if (own != d.effects.end() ? in_shape_of(one.effect, *own) : same->moved_w < one.moved_w)
       *same = std::move(one);
   }
   std::vector<double> deviations;
