@@ -323,6 +323,9 @@ dynamics::DriveModel PowerParameters::model(const PowerVector& x) const {
 
 robot::RobotModel PowerParameters::robot(const PowerVector& x) const {
   robot::RobotModel robot = without_effects(x);
+  // A value at its bound is beyond it by rounding.
+  robot.idle_power_w = std::max(robot.idle_power_w, 0.0);
+  robot.motor.viscous_friction_nm_s_rad = std::max(robot.motor.viscous_friction_nm_s_rad, 0.0);
   for (const dynamics::ActiveEffect& e : found_effects(x)) {
     robot::AdoptedEffect more = dynamics::adopt(e);
     const auto had = std::ranges::find(robot.effects, more.id, &robot::AdoptedEffect::id);
@@ -332,7 +335,7 @@ robot::RobotModel PowerParameters::robot(const PowerVector& x) const {
     }
     const std::string strength = more.parameters.front().first;
     for (auto& [name, number] : had->parameters)
-      if (name == strength) number += e.values[0];
+      if (name == strength) number = std::max(number + e.values[0], 0.0);
   }
   return robot;
 }
