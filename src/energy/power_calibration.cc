@@ -477,7 +477,6 @@ void tell_extent(const PowerWindows& data, const Found& found, PowerCalibration&
   out.slowest_rad_s = std::isfinite(slowest) ? slowest : 0;
   out.fastest_rad_s = fastest;
   out.power_w = power / static_cast<double>(out.windows);
-  out.left_w = mean_left_w(found.parameters.model(found.fit.x), data, every_block);
 }
 
 }  // namespace
@@ -487,7 +486,7 @@ Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
                                               const PowerCalibrationOptions& options) {
   std::optional<PowerWindows> data;
   std::optional<Found> found;
-  double least_w = std::numeric_limits<double>::infinity();
+  PowerCalibration out;
   for (const double phase : row_phases) {
     TRY_ASSIGN(auto own_data, power_windows(missions, robot, phase));
     TRY_ASSIGN(const auto parameters,
@@ -495,8 +494,8 @@ Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
     TRY_ASSIGN(auto own, find(parameters, own_data, every_block, robot));
     const double left_w = mean_left_w(own.parameters.model(own.fit.x), own_data, every_block);
     const bool far_apart = std::isfinite(own_data.phase);
-    if (left_w < least_w) {
-      least_w = left_w;
+    if (!found || left_w < out.left_w) {
+      out.left_w = left_w;
       data = std::move(own_data);
       found = std::move(own);
     }
@@ -505,7 +504,6 @@ Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
   widen_by_unknown_motion(missions, *data, robot, *found);
   if (options.progress) options.progress(0.4);
   TRY_ASSIGN(const auto halves, predict_halves(found->parameters, *data, robot));
-  PowerCalibration out;
   out.robot = found->parameters.robot(found->fit.x);
   out.halves = halves;
   out.estimates = power_estimates(found->parameters, found->fit, found->free);

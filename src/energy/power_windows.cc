@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/try.h"
+#include "windows/track.h"
 
 namespace joulecast::energy {
 namespace {
@@ -17,7 +18,6 @@ constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
 // Rows as far apart as this show parts of a ramp: the motion is then known between rows only.
 constexpr double far_apart_s = 0.125;
 constexpr std::size_t rows_a_window = 4;
-constexpr double turning_rad_s = 0.10, still_rad_s = 0.03;  // of single rows, and of the mean of four
 
 // Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
 // assumed, on the wide side. Parameters that the recordings show well do not depend on them.
@@ -88,9 +88,10 @@ std::vector<windows::Window> between_rows(std::span<const telemetry::Recording> 
         least = std::min(least, s.wheel_velocity_rad_s[side]);
         most = std::max(most, s.wheel_velocity_rad_s[side]);
       }
-      w.moving[side] = least > turning_rad_s || most < -turning_rad_s;
-      w.resting[side] =
-          std::max(most, -least) < turning_rad_s && std::fabs(w.speed_rad_s[side]) < still_rad_s;
+      // The noise of single rows is larger than that of their mean.
+      w.moving[side] = least > windows::moving_rad_s || most < -windows::moving_rad_s;
+      w.resting[side] = std::max(most, -least) < windows::moving_rad_s &&
+                        std::fabs(w.speed_rad_s[side]) < windows::resting_rad_s;
     }
     return !std::isfinite(w.battery_power_w);
   });

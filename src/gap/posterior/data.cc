@@ -188,12 +188,15 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.covariates = windows::covariate_names(missions);
   const windows::Readings readings = windows::find_readings(missions);
   d.sample_s = readings.row_s;
-  windows::WindowSettings by{.electrical_delay_s = electrical_delay_s, .most_windows = most_windows};
-  for (std::vector<Window>* made : {&d.windows, &d.halves[0], &d.halves[1]}) {
-    *made = windows::make_windows(missions, robot, readings, by);
-    std::erase_if(*made, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
-    by.half = by.half ? 1 : 0;  // of the next
-  }
+  const auto windows_by = [&](std::optional<std::size_t> half) {
+    auto made = windows::make_windows(
+        missions, robot, readings,
+        {.electrical_delay_s = electrical_delay_s, .most_windows = most_windows, .half = half});
+    std::erase_if(made, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
+    return made;
+  };
+  d.windows = windows_by({});
+  d.halves = {windows_by(0), windows_by(1)};
   const auto whole = [](const Window& w) { return w.reading || windows::steady(w); };
   if (static_cast<std::size_t>(std::ranges::count_if(d.windows, whole)) < fewest_windows)
     return fail(Fault::invalid, "", "too little known motion");

@@ -55,7 +55,7 @@ double moved_w(const posterior::Fit& fit, const dynamics::ActiveEffect& effect) 
 
 // Whether the effect differs from the diagnosed one in its strengths only.
 bool in_shape_of(const robot::AdoptedEffect& effect, const DiagnosedEffect& diagnosed) {
-  const auto info = dynamics::find_effect(effect.id)->info();
+  const auto& info = dynamics::find_effect(effect.id)->info();
   for (std::size_t k = 1; k < info.parameters.size(); ++k)
     if (!info.parameters[k].strength && effect.parameters[k].second != diagnosed.parameters[k].value)
       return false;
