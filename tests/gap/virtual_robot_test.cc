@@ -161,6 +161,14 @@ TEST(VirtualRobot, NamesDissipativeSlip) {
   EXPECT_NEAR(std::fabs(d.effects[0].parameters[0].value), 0.1, 0.01);
 }
 
+// Little of the power is lost in the windings, but the motors' voltages show it.
+TEST(VirtualRobot, NamesResistanceByVoltage) {
+  const Diagnosis d = diagnose_virtual({{"resistance_error", 0.5}}, 15, true);
+  ASSERT_EQ(d.effects.size(), 1u);
+  EXPECT_EQ(d.effects[0].id, "resistance_error");
+  EXPECT_NEAR(d.effects[0].parameters[0].value, 0.5, 0.05);
+}
+
 TEST(VirtualRobot, SeparatesBrushDropFromResistance) {
   const Diagnosis d = diagnose_virtual({{"brush_drop", 1.2}}, 15, true);
   ASSERT_EQ(d.effects.size(), 1u);

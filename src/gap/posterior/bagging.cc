@@ -8,17 +8,15 @@
 #include "statistics/bootstrap.h"
 
 namespace joulecast::gap::posterior {
-namespace {
 
-// Whether a hypothesis is visible in other channels than power: its size is measured there.
-bool shows_elsewhere(const Hypothesis& h) {
-  if (!h.is_effect()) return false;
-  if (traits_of(h.id()).elsewhere) return true;
-  const bool sensor = h.effect.effect->info().acts_on == dynamics::ActsOn::sensors;
-  return sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0;  // the motors' sensors alone
+bool shows_elsewhere(const Fit& fit, const Hypothesis& h) {
+  // Without motor channels kinematics are checks of the data, not causes of a gap in power.
+  if (!h.is_effect() || fit.data.at_readings()) return false;
+  const dynamics::ActsOn acts_on = h.effect.effect->info().acts_on;
+  const bool sensor = acts_on == dynamics::ActsOn::sensors;
+  return traits_of(h.id()).elsewhere || acts_on == dynamics::ActsOn::motor ||
+         (sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0);  // the motors' sensors alone
 }
-
-}  // namespace
 
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models, int draws) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(ix(models.size()));
@@ -46,9 +44,7 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.columns;
-      // Without motor channels kinematics are checks of the data, not causes of a gap in power.
-      const Eigen::VectorXd& size =
-          shows_elsewhere(hypothesis) && !fit.data.at_readings() ? e.moves : e.share;
+      const Eigen::VectorXd& size = shows_elsewhere(fit, hypothesis) ? e.moves : e.share;
       double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +

@@ -9,6 +9,9 @@ namespace joulecast::gap::posterior {
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models,
                        int draws = resamples);
 
+// Whether a hypothesis is visible in other channels than power: its size is measured there.
+bool shows_elsewhere(const Fit& fit, const Hypothesis& hypothesis);
+
 // Effects and functions of a model that move more than a threshold.
 struct Content {
   std::vector<std::string> ids;  // ascending

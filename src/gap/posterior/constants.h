@@ -38,10 +38,10 @@ inline constexpr double effect_tolerance = 0.0025, function_tolerance = 0.003, m
                         idle_scatter = 0.008;
 inline constexpr double inductance_tolerance_h = 1e-5, usual_inductance_h = 0.01;
 // Nuisances: sides of resistance and of friction, zeros of sensors over their ranges, open-circuit voltage
-// and its fall over the charge, zero of the gyro.
+// and its fall over the charge, zero of the gyro, yaw inertia of a kilogram of payload beyond the contract's.
 inline constexpr double resistance_sides = 0.01, viscous_sides = 0.05, current_zero = 0.0007,
                         voltage_zero = 0.0004, battery_level = 0.15, battery_fall = 0.5,
-                        gyro_zero_rad_s = 0.01;
+                        gyro_zero_rad_s = 0.01, payload_yaw_m2 = 0.1;
 inline constexpr double table_shift = 0.02;  // common deviation of the energies of a table of runs
 
 // --- noise

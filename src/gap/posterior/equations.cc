@@ -35,6 +35,7 @@ enum class Nuisance : std::size_t {
   battery_fall,
   battery_resistance,
   gyro,
+  payload_yaw,
   count
 };
 constexpr auto nuisance_count = static_cast<std::size_t>(Nuisance::count);
@@ -260,6 +261,14 @@ class Builder {
     const robot::Motor& m = d_.robot.motor;
     const double kt = m.torque_constant_nm_a * m.gear_ratio, half = s == 0 ? 0.5 : -0.5;
     const auto own = [&](Nuisance right) -> double& { return x(at, nuisance(right) + ix(s)); };
+    // Differences of the wheels' torques, by the reading that a torque moves.
+    const auto torques = [&](double per_nm) {
+      const double arm = d_.robot.kinematics.wheel_radius_m / d_.robot.kinematics.half_track_m;
+      x(at, nuisance(Nuisance::viscous_sides)) =
+          half * per_nm * m.viscous_friction_nm_s_rad * w.speed_rad_s[s];
+      x(at, nuisance(Nuisance::payload_yaw)) = half * per_nm * 0.5 * arm * arm * w.payload_kg *
+                                               (w.acceleration_rad_s2[0] - w.acceleration_rad_s2[1]);
+    };
     switch (channel) {
       case Channel::voltage_right:
         x(at, nuisance(Nuisance::resistance_sides)) = half * m.resistance_ohm * w.current_a[s];
@@ -267,7 +276,7 @@ class Builder {
         own(Nuisance::current_right) = -m.resistance_ohm;
         break;
       case Channel::torque_right:
-        x(at, nuisance(Nuisance::viscous_sides)) = half * m.viscous_friction_nm_s_rad * w.speed_rad_s[s] / kt;
+        torques(1 / kt);
         own(Nuisance::current_right) = 1;
         // A current is read once a row while the controller keeps its voltage constant: the reading differs
         // from the mean accordingly.
@@ -275,8 +284,7 @@ class Builder {
             m.voltage_constant_v_s_rad * m.gear_ratio / m.resistance_ohm * w.acceleration_rad_s2[s];
         break;
       case Channel::drive_right:
-        x(at, nuisance(Nuisance::viscous_sides)) =
-            half * m.resistance_ohm * m.viscous_friction_nm_s_rad * w.speed_rad_s[s] / kt;
+        torques(m.resistance_ohm / kt);
         own(Nuisance::voltage_right) = 1;
         break;
       case Channel::bus:
@@ -412,6 +420,7 @@ class Builder {
       column(Nuisance::battery_resistance).of_file = true;
     }
     column(Nuisance::gyro).scatter = gyro_zero_rad_s;
+    column(Nuisance::payload_yaw).tolerance = payload_yaw_m2;
     for (std::size_t k = 0; k < d_.shifts.size(); ++k) {
       Column& c = e_.columns[e_.size() - 1 - k];
       c.unit = 0;

@@ -379,8 +379,8 @@ class Explainer {
   // visible in channels without power. Absent where that does not hold.
   std::optional<double> probability_of_none(Verdict v) const {
     const HeldOut& h = a_.held_out;
-    const bool elsewhere = std::ranges::any_of(a_.effects, [](const ExplainedBy& e) {
-      return e.bagged * e.constant >= named && traits_of(e.id).elsewhere;
+    const bool elsewhere = std::ranges::any_of(a_.effects, [&](const ExplainedBy& e) {
+      return e.bagged * e.constant >= named && shows_elsewhere(fit_, fit_.catalogue.hypotheses[e.hypothesis]);
     });
     if (!h.known || elsewhere || gap_is_left()) return std::nullopt;
     const bool worse =
