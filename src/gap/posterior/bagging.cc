@@ -10,11 +10,11 @@
 namespace joulecast::gap::posterior {
 
 bool shows_elsewhere(const Fit& fit, const Hypothesis& h) {
-  // Without motor channels kinematics are checks of the data, not causes of a gap in power.
-  if (!h.is_effect() || fit.data.at_readings()) return false;
+  if (!h.is_effect()) return false;
   const dynamics::ActsOn acts_on = h.effect.effect->info().acts_on;
+  const bool motor = acts_on == dynamics::ActsOn::motor && fit.data.motors;
   const bool sensor = acts_on == dynamics::ActsOn::sensors;
-  return traits_of(h.id()).elsewhere || acts_on == dynamics::ActsOn::motor ||
+  return traits_of(h.id()).elsewhere || motor ||
          (sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0);  // the motors' sensors alone
 }
 
@@ -44,7 +44,9 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.columns;
-      const Eigen::VectorXd& size = shows_elsewhere(fit, hypothesis) ? e.moves : e.share;
+      // Without motor channels kinematics are checks of the data, not causes of a gap in power.
+      const Eigen::VectorXd& size =
+          shows_elsewhere(fit, hypothesis) && !fit.data.at_readings() ? e.moves : e.share;
       double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
