@@ -50,16 +50,14 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
                     live ? "this computer's clock" : "the time of the recording"),
         ahead_s);
   if (tally.subject != telemetry::Subject::telemetry) return;
-  // Without the pauses between missions.
-  const double sampled_hz = static_cast<double>(tally.bridged) / tally.bridged_s;
-  const double rate_hz = tally.bridged > 0 ? sampled_hz : tally.rate_hz();
+  const double rate_hz = tally.rate_hz();
   if (tally.messages > 1 && (rate_hz < 0.9 * least_rate_hz || rate_hz > 1.1 * greatest_rate_hz))
     add(false, "",
         fmt::format("{:.4g} messages a second; {} to {} are expected: is the unit of the times right?",
                     rate_hz, least_rate_hz, greatest_rate_hz),
         rate_hz);
-  if (std::string slow = telemetry::slow_stream(sampled_hz); !slow.empty())
-    add(false, "", std::move(slow), sampled_hz);
+  if (std::string slow = telemetry::slow_stream(rate_hz); tally.bridged > 0 && !slow.empty())
+    add(false, "", std::move(slow), rate_hz);
   const telemetry::SequenceCounters& s = tally.sequence;
   const auto counted = [&](std::uint64_t count, bool fault, const char* field, const char* thing,
                            const char* says) {

@@ -43,10 +43,13 @@ using planning::Pose;
 
 constexpr std::size_t max_points = 100'000;
 constexpr double max_length_m = 1e5;
-constexpr double max_turn_rad = 100 * std::numbers::pi;
+constexpr double max_arc_rad = 100 * std::numbers::pi;
+// More turns on the spot end at no other heading; usual angles in degrees are greater.
+constexpr double max_turn_rad = 4 * std::numbers::pi;
 constexpr Bounds length{.minimum = 1e-6, .maximum = max_length_m};
 constexpr Bounds straight_length{.minimum = 0, .maximum = max_length_m};
 constexpr Bounds curvature{.minimum = -1e3, .maximum = 1e3};
+constexpr Bounds arc{.minimum = -max_arc_rad, .maximum = max_arc_rad};
 constexpr Bounds turn{.minimum = -max_turn_rad, .maximum = max_turn_rad};
 constexpr described::Count segments_of_path{1, 10'000, "segments"};
 
@@ -77,7 +80,7 @@ const described::Variants<planning::Segment, PathContext>& segments() {
           .of("arc", "an arc of a circle",
               Part<Arc>()
                   .number("radius_m", &Arc::radius_m, length, "radius of the arc")
-                  .number("angle_rad", &Arc::angle_rad, turn, "positive to the left"))
+                  .number("angle_rad", &Arc::angle_rad, arc, "positive to the left"))
           .of("polyline", "straights from point to point, turning on the spot between them",
               Part<Polyline>()
                   .list("points", &Polyline::points, {1, max_points, "points"}, "points after the start",
@@ -304,17 +307,16 @@ const Input<Way, PathContext>& way_input() {
 }
 
 const Input<Way, PathContext>& former_way_input() {
-  static const auto input = WayInput()
-                                .number("turn_rad", former_segment<planning::TurnInPlace>(),
-                                        {.minimum = -1e3, .maximum = 1e3}, "turns_rad with one turn")
-                                .deprecated()
-                                .number("distance_m", former_segment<planning::Straight>(),
-                                        {.minimum = 0, .maximum = 1e6}, "distances_m with one distance")
-                                .deprecated()
-                                .check([](Fields& fields, Way& way, PathContext&) {
-                                  way.placed =
-                                      way.placed && (fields.has("turn_rad") || !fields.has("distance_m"));
-                                });
+  static const auto input =
+      WayInput()
+          .number("turn_rad", former_segment<planning::TurnInPlace>(), turn, "turns_rad with one turn")
+          .deprecated()
+          .number("distance_m", former_segment<planning::Straight>(), {.minimum = 0, .maximum = 1e6},
+                  "distances_m with one distance")
+          .deprecated()
+          .check([](Fields& fields, Way& way, PathContext&) {
+            way.placed = way.placed && (fields.has("turn_rad") || !fields.has("distance_m"));
+          });
   return input;
 }
 

@@ -138,7 +138,8 @@ void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
 
 const auto matrix_task_input =
     Input<ReadTask, MatrixContext>()
-        .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
+        .text("task_id", &ReadTask::task_id, max_task_id_bytes,
+              "the caller's name of the task, of one task only")
         .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
                 "carried from the pick-up to the drop-off", 0)
         .include(stations_input(), AT(task.stations))
@@ -252,7 +253,11 @@ const auto matrix_input =
               matrix.tasks.push_back(std::move(read.task));
               matrix.former = matrix.former || read.former;
             },
-            tasks_of_matrix, "the columns", matrix_task_input);
+            tasks_of_matrix, "the columns", matrix_task_input)
+        .check([](Fields& fields, MatrixInput& matrix, MatrixContext&) {
+          refuse_repeated(fields, "robots", matrix.robots, &Robot::robot_id);
+          refuse_repeated(fields, "tasks", matrix.task_ids, std::identity());
+        });
 
 }  // namespace
 

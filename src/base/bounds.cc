@@ -8,7 +8,7 @@ namespace joulecast {
 namespace {
 
 std::string with_unit(double value, std::string_view unit) {
-  return unit.empty() ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
+  return unit.empty() || unit == "1" ? fmt::format("{}", value) : fmt::format("{} {}", value, unit);
 }
 
 }  // namespace

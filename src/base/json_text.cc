@@ -66,7 +66,8 @@ class StrictBuilder : public nlohmann::json_sax<Json> {
     std::string text = cause.what();
     const auto start = text.find("] ");
     if (start != std::string::npos) text.erase(0, start + 2);
-    const std::string hint = not_finite_hint(text_, position);
+    constexpr int out_of_range = 406;  // of nlohmann: a number beyond those of a double
+    const std::string hint = cause.id == out_of_range ? "; must be finite" : not_finite_hint(text_, position);
     error_ = Error{Fault::invalid, hint.empty() ? "" : pointer(open_.size()).to_string(),
                    "malformed JSON at byte " + std::to_string(position) + ": " + text + hint};
     return false;

@@ -303,13 +303,13 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
     if (dropped && !seen) continue;
     ParameterEstimate e{own.name,
                         own.unit,
-                        parameters.value(p, fit.x),
+                        parameters.resulting(p, fit.x),
                         parameters.expected(p) * fit.deviation[p],
                         seen,
                         std::string(own.meaning)};
     if (known) e.note = "given as known";
     if (!known && !seen) e.note = "not identified: " + why(parameters, fit, p);
-    if (dropped) e.note = "not detected";
+    if (dropped) e.note = e.value > 0 ? "no change of the file's detected" : "not detected";
     estimates.push_back(std::move(e));
   }
   return estimates;

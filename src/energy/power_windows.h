@@ -98,6 +98,10 @@ class PowerParameters {
   double expected(Eigen::Index p) const { return expected_[p]; }  // 0: held at the file's
   // In its own unit. The friction of a side is at least zero for every mean and difference.
   double value(Eigen::Index p, const PowerVector& x) const;
+  // The value in robot(): of an effect, with the file's strength, which its least change removes.
+  double resulting(Eigen::Index p, const PowerVector& x) const {
+    return value(p, x) - (p >= PowerParameter::turning_scrub ? least_[p] : 0);
+  }
   double least(Eigen::Index p) const { return in_units(p, least_[p]); }  // bounds in units of x
   double most(Eigen::Index p) const { return in_units(p, most_[p]); }
 

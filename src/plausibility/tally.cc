@@ -65,7 +65,7 @@ void ClockTally::add(std::int64_t utime_us, std::int64_t sequence) {
     const std::int64_t step = utime_us - before_us_;
     if (step == 0) ++repeated_;
     if (step < 0) ++backward_;
-    if (step > 0 && step >= step_us_ / corner) {
+    if (step > 0 && step_us_ >= 0 && step >= step_us_ / corner) {
       ++steps_.count;
       steps_.seconds += 1e-6 * static_cast<double>(step);
     }

@@ -38,7 +38,7 @@ class ClockTally {
   double length_s() const { return 1e-6 * static_cast<double>(last_us_ - first_us_); }
   // Mean time between rows without gaps; 0 without two that differ. A step much shorter than the one before
   // is excluded: an import inserts such steps before changes of a held reading (hold), and publishers catch
-  // up with such steps after a stall.
+  // up with such steps after a stall. So is the step after one back.
   double period_s() const;
   std::size_t repeated() const { return repeated_; }  // same time as the row before
   std::size_t backward() const { return backward_; }  // earlier than the row before

@@ -51,6 +51,7 @@ void FieldTally::take(double value) {
 }
 
 double ChannelTally::rate_hz() const {
+  if (bridged > 0) return static_cast<double>(bridged) / bridged_s;
   const double time_s = 1e-6 * static_cast<double>(last_utime_us - first_utime_us);
   return messages > 1 && time_s > 0 ? static_cast<double>(messages - 1) / time_s : 0;
 }

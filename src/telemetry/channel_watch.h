@@ -46,7 +46,7 @@ struct ChannelTally {
   // with a sentence on the last.
   std::map<std::string, std::pair<std::uint64_t, std::string>> faults;
 
-  // Messages a second over the whole time; 0 for fewer than two.
+  // Messages a second; of telemetry without gaps, else over the whole time; 0 for fewer than two.
   [[nodiscard]] double rate_hz() const;
 };
 

@@ -1,5 +1,7 @@
 #include "telemetry/sequence_tracker.h"
 
+#include <algorithm>
+
 namespace joulecast::telemetry {
 namespace {
 
@@ -49,6 +51,10 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
 }
 
 Placement SequenceTracker::place(std::int64_t sequence, std::int64_t utime_us) noexcept {
+  if (sequence > fallen_from_) {
+    --counters_.restarts;
+    newest_sequence_ = std::min(fallen_from_ + 1, sequence - 1);
+  }
   const Placement placement = classify(sequence, utime_us);
   ++counters_.received;
   switch (placement.arrival) {
@@ -73,7 +79,10 @@ Placement SequenceTracker::place(std::int64_t sequence, std::int64_t utime_us) n
   counters_.clock_backward += placement.clock == ClockStep::backward ? 1 : 0;
   counters_.clock_forward += placement.clock == ClockStep::forward ? 1 : 0;
 
-  if (placement.arrival == Arrival::restart) seen_.fill({});
+  const bool restart = placement.arrival == Arrival::restart;
+  if (restart) seen_.fill({});
+  const bool fell = restart && sequence < newest_sequence_ && placement.clock == ClockStep::none;
+  fallen_from_ = fell ? newest_sequence_ : INT64_MAX;
   started_ = true;
   paused_ = false;
   newest_sequence_ = sequence;

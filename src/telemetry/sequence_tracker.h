@@ -58,7 +58,9 @@ struct SequenceCounters {
 // that goes back with the clock is late, or a duplicate when that number and instant were seen among the last
 // `memory` samples; one that goes back with a clock further back than backward_jump_us is a restart with a
 // clock step. A clock that does not advance while the sequence does is a backward step; one that leaps while
-// the robot stayed up is a forward step, but before a restart it is the time the robot was off.
+// the robot stayed up is a forward step, but before a restart it is the time the robot was off. Where the
+// number after a restart goes on above those before it, the restart was one corrupt number and is not
+// counted.
 class SequenceTracker {
  public:
   static constexpr std::size_t memory = 64;
@@ -85,6 +87,7 @@ class SequenceTracker {
   std::array<Seen, memory> seen_{};
   bool started_ = false, paused_ = false;
   std::int64_t newest_sequence_ = 0;
+  std::int64_t fallen_from_ = INT64_MAX;  // the number before the newest one, where that one restarted below
   std::int64_t newest_utime_us_ = 0;
 };
 

@@ -400,6 +400,8 @@ TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
            {{{"robots", a}, {"tasks", {with(stations_, "dropoff", nullptr)}}}, "/tasks/0/dropoff"},
            {{{"robots", a}, {"tasks", {far}}}, "/tasks/0/dropoff"},
            {{{"robots", a}, {"tasks", {leg}}}, "/tasks/0/loaded/turns_rad/1"},
+           {{{"robots", {"a", "b", {{"robot_id", "a"}}}}, {"tasks", {legs_}}}, "/robots/2"},
+           {{{"robots", a}, {"tasks", {legs_, legs_}}}, "/tasks/1"},
            {{{"robots", a}, {"tasks", {with(legs_, "loaded", loaded)}}}, "/tasks/0/loaded/path/0/payload_kg"},
            {{{"robots", a}, {"tasks", {legs_}}, {"regeneration", 1.5}}, "/regeneration"},
            {{{"robots", rows}, {"tasks", columns}}, "/tasks", Fault::too_large},

@@ -153,6 +153,7 @@ TEST_P(EveryEffect, RejectsValuesBeyondBounds) {
     const Result<ActiveEffect> refused = activate(adopted);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().field, "/effects/" + std::string(info.id) + "/" + std::string(p.name));
+    EXPECT_EQ(refused.error().message.find(" 1,"), std::string::npos) << refused.error().message;
   }
 }
 

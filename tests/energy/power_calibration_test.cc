@@ -121,6 +121,19 @@ TEST_P(CalibratedFleet, CoversTheTrueParameters) {
   EXPECT_GE(all.within_two, 0.9 * all.told);
 }
 
+TEST(CalibrateFromPower, EstimatesEffectsAsInItsFile) {
+  Case c = misjudged_power(virtual_robot::shipped_robots()[0], 1);
+  c.file.effects.push_back({"turning_scrub", {{"coefficient", 0.2}, {"rate_rad_s", 0.02}}});
+  const auto found = calibrate_from_power(c.file, c.missions);
+  ASSERT_TRUE(found) << describe(found.error());
+  const auto& of_file = found->robot.effects.front();
+  ASSERT_EQ(of_file.id, "turning_scrub");
+  const auto scrub = std::ranges::find(found->estimates, of_file.id, &ParameterEstimate::name);
+  ASSERT_NE(scrub, found->estimates.end());
+  EXPECT_NEAR(scrub->value, of_file.parameters.front().second, 1e-12);
+  EXPECT_NEAR(scrub->value, c.truth["turning_scrub"], 3 * scrub->standard_error);
+}
+
 // Straight on at one speed: terms with and without the speed cannot be separated, and the robot neither turns
 // nor accelerates.
 TEST(CalibrateFromPower, ReportsUnidentifiableParameters) {

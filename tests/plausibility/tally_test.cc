@@ -57,5 +57,12 @@ TEST(ClockTally, IgnoresStepsOfHeldReadings) {
   EXPECT_NEAR(clock.period_s(), 0.5, 1e-3);
 }
 
+TEST(ClockTally, PeriodOmitsWayBackFromForeignTimes) {
+  ClockTally clock;
+  for (std::int64_t k = 0; k < 200; ++k)
+    clock.add((k == 100 ? 1'000'000'000 : 1'000'000'000'000'000) + 20'000 * k, k);
+  EXPECT_NEAR(clock.period_s(), 0.02, 1e-4);
+}
+
 }  // namespace
 }  // namespace joulecast::plausibility

@@ -208,6 +208,9 @@ TEST(JsonText, PointersUseArrayIndices) {
   for (const char* text : {R"({"a": none})", R"({"a": i})", R"({"a": -})", "[n", "N"})
     EXPECT_EQ(parse_json(text).error().message.find("JSON has no"), std::string::npos) << text;
   EXPECT_EQ(parse_json(R"([[], [[]]])", 2).error().field, "/1/0");
+  const Error beyond = parse_json(R"({"a": [1, {"b": 1e999}]})").error();
+  EXPECT_EQ(beyond.field, "/a/1/b");
+  EXPECT_TRUE(beyond.message.ends_with("'1e999'; must be finite")) << beyond.message;
 }
 
 TEST(JsonText, BoundsDepthAndKeepsValues) {

@@ -43,6 +43,17 @@ TEST(ChannelWatch, CountsRatesValuesAndGaps) {
   EXPECT_EQ(tally.fields[2].measured, 0u);  // a motor's voltage that this robot does not measure
 }
 
+TEST(ChannelWatch, RateOmitsStepsOfClock) {
+  ChannelWatch watch;
+  for (std::int64_t k = 0; k < 50; ++k) watch.add("a", sample_at(k));
+  for (std::int64_t k = 0; k < 50; ++k) {
+    signals::Sample sample = sample_at(k);
+    sample.utime_us = 10'000'000 + 20'000 * k;
+    watch.add("a", sample);
+  }
+  EXPECT_NEAR(watch.channels().at("ROBOT_TELEMETRY.a").rate_hz(), 50, 1e-9);
+}
+
 TEST(ChannelWatch, CountsGapsInOrder) {
   ChannelWatch watch;
   for (const std::int64_t k : {0, 1, 3, 2, 4, 200, 201, 202, 202, 203, 400})

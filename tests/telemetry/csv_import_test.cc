@@ -59,6 +59,16 @@ TEST(CsvImport, ReadsTimesAndNames) {
   EXPECT_TRUE(std::isnan(recording.samples[1].battery_voltage_v));
 }
 
+TEST(CsvImport, ReadsChangingPayload) {
+  auto mapping = mapping_of(R"("empty_cells": "unmeasured", )", R"(, "payload_mass": {"column": "kg"})");
+  const auto import = import_csv("t,r,l,kg\n0.5,1,2,0\n0.75,3,4,\n1,3,4,20\n", mapping);
+  ASSERT_TRUE(import) << describe(import.error());
+  EXPECT_TRUE(std::isnan(import->recording.payload_kg));
+  EXPECT_EQ(import->recording.samples[0].payload_kg, 0);
+  EXPECT_TRUE(std::isnan(import->recording.samples[1].payload_kg));
+  EXPECT_EQ(import->recording.samples[2].payload_kg, 20);
+}
+
 TEST(CsvImport, UsesCallerNamesAndStart) {
   ImportOptions options{"data/ICE/run_1.csv", "robot-9", "{folder}-{stem}", 1'700'000'000'000'000};
   const auto import = import_csv("t,r,l\n7,1,2\n8,3,4\n", mapping_of(""), options);

@@ -73,6 +73,24 @@ TEST_F(SequenceTrackerTest, RestartWithRunningClockContinues) {
   EXPECT_EQ(tracker.counters().missing, 0u);
 }
 
+TEST_F(SequenceTrackerTest, OneCorruptNumberIsNoRestart) {
+  run_to(1199);
+  tracker.place(0, at(1200));
+  const Placement next = tracker.place(1203, at(1203));
+  EXPECT_EQ(next.arrival, Arrival::fresh);
+  EXPECT_EQ(next.missing, 2);
+  EXPECT_EQ(tracker.counters().restarts, 0u);
+  EXPECT_EQ(tracker.place(1203, at(1203)).arrival, Arrival::duplicate);
+  // Of a restart, the second sample shows that.
+  tracker.place(0, at(1300));
+  tracker.place(1, at(1301));
+  EXPECT_EQ(tracker.place(1205, at(1400)).missing, 1203);
+  EXPECT_EQ(tracker.counters().restarts, 1u);
+  tracker.place(0, 1'000'000);
+  EXPECT_EQ(tracker.place(1210, 1'010'000).missing, 1209);
+  EXPECT_EQ(tracker.counters().restarts, 2u);
+}
+
 TEST_F(SequenceTrackerTest, RestartForgetsEarlierNumbers) {
   run_to(10);
   tracker.place(0, at(20));
