@@ -1,10 +1,10 @@
-#include "server/cluster/assignment.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 #include <set>
+
+#include "server/cluster/cluster.h"
 
 namespace joulecast::server {
 namespace {
