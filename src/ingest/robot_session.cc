@@ -1,8 +1,5 @@
 #include "ingest/robot_session.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>

@@ -92,7 +92,7 @@ std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
   for (std::size_t k = 1; k < rows.size(); ++k) {
     const std::int64_t step_us = rows[k].since_zero_us - rows[k - 1].since_zero_us;
     steps_us.push_back(std::abs(step_us));
-    if (step_us < 0 || step_us > SequenceLimits{}.forward_jump_us) steps.push_back(k);
+    if (step_us < 0 || step_us > forward_jump_us) steps.push_back(k);
   }
   if (steps.empty() || steps.size() * often >= rows.size()) return {};
   const std::int64_t usual_us = upper_median(std::move(steps_us));

@@ -25,7 +25,7 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
   const std::int64_t step = difference(sequence, newest_sequence_);
   placement.elapsed_us = difference(utime_us, newest_utime_us_);
   if (step > 0) {
-    placement.arrival = step - 1 <= limits_.max_missing ? Arrival::fresh : Arrival::restart;
+    placement.arrival = step - 1 <= max_missing ? Arrival::fresh : Arrival::restart;
     if (placement.arrival == Arrival::fresh) placement.missing = step - 1;
     if (placement.elapsed_us <= 0) placement.clock = ClockStep::backward;
   } else {
@@ -37,7 +37,7 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
     }
     if (placement.elapsed_us > 0) {
       placement.arrival = Arrival::restart;
-    } else if (placement.elapsed_us < -limits_.backward_jump_us) {
+    } else if (placement.elapsed_us < -backward_jump_us) {
       placement.arrival = Arrival::restart;
       placement.clock = ClockStep::backward;
     } else {
@@ -45,7 +45,7 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
       return placement;
     }
   }
-  if (!paused_ && placement.elapsed_us > limits_.forward_jump_us && placement.arrival == Arrival::fresh)
+  if (!paused_ && placement.elapsed_us > forward_jump_us && placement.arrival == Arrival::fresh)
     placement.clock = ClockStep::forward;
   return placement;
 }

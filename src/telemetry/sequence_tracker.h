@@ -6,12 +6,12 @@
 
 namespace joulecast::telemetry {
 
-struct SequenceLimits {
-  std::int64_t forward_jump_us =
-      3'600'000'000;                          // a longer one is the robot's clock being set, not time passing
-  std::int64_t backward_jump_us = 5'000'000;  // an older sample by more than this is not merely late
-  std::int64_t max_missing = 1'000'000;       // a larger leap of the sequence is a restart, not a loss
-};
+// A longer jump is the robot's clock being set, not time passing.
+inline constexpr std::int64_t forward_jump_us = 3'600'000'000;
+// A sample that is older by more than this is not merely late.
+inline constexpr std::int64_t backward_jump_us = 5'000'000;
+// A larger leap of the sequence is a restart, not a loss.
+inline constexpr std::int64_t max_missing = 1'000'000;
 
 enum class Arrival {
   first,      // the first sample of this robot's stream
@@ -65,8 +65,6 @@ class SequenceTracker {
  public:
   static constexpr std::size_t memory = 64;
 
-  explicit SequenceTracker(SequenceLimits limits = {}) noexcept : limits_(limits) {}
-
   Placement place(std::int64_t sequence, std::int64_t utime_us) noexcept;
   // A mission begins: the time before its first sample is a pause, however long, and no forward step.
   void pause() noexcept { paused_ = true; }
@@ -82,7 +80,6 @@ class SequenceTracker {
   [[nodiscard]] Seen& slot(std::int64_t sequence) noexcept;
   [[nodiscard]] Placement classify(std::int64_t sequence, std::int64_t utime_us) noexcept;
 
-  SequenceLimits limits_;
   SequenceCounters counters_;
   std::array<Seen, memory> seen_{};
   bool started_ = false, paused_ = false;

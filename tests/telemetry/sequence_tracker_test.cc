@@ -125,10 +125,9 @@ TEST_F(SequenceTrackerTest, DetectsStoppedOrReversedClock) {
 }
 
 TEST_F(SequenceTrackerTest, DetectsForwardJumpAboveLimit) {
-  const SequenceLimits limits;
   run_to(0);
-  EXPECT_TRUE(tracker.place(1, base_us + limits.forward_jump_us).continues());
-  const Placement jump = tracker.place(2, base_us + 2 * limits.forward_jump_us + 1);
+  EXPECT_TRUE(tracker.place(1, base_us + forward_jump_us).continues());
+  const Placement jump = tracker.place(2, base_us + 2 * forward_jump_us + 1);
   EXPECT_EQ(jump.clock, ClockStep::forward);
   EXPECT_FALSE(jump.continues());
 }
@@ -142,11 +141,10 @@ TEST_F(SequenceTrackerTest, PowerOffKeepsClock) {
 }
 
 TEST_F(SequenceTrackerTest, ImplausibleLeapIsARestart) {
-  const SequenceLimits limits;
   run_to(0);
-  EXPECT_EQ(tracker.place(limits.max_missing + 1, at(1)).missing, limits.max_missing);
-  EXPECT_EQ(tracker.place(2 * limits.max_missing + 3, at(2)).arrival, Arrival::restart);
-  EXPECT_EQ(tracker.counters().missing, static_cast<std::uint64_t>(limits.max_missing));
+  EXPECT_EQ(tracker.place(max_missing + 1, at(1)).missing, max_missing);
+  EXPECT_EQ(tracker.place(2 * max_missing + 3, at(2)).arrival, Arrival::restart);
+  EXPECT_EQ(tracker.counters().missing, static_cast<std::uint64_t>(max_missing));
 }
 
 TEST_F(SequenceTrackerTest, OldNumberKeepsNewerOnes) {
