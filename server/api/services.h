@@ -11,7 +11,7 @@
 #include "history/writer.h"
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
-#include "ingest/mission_requests.h"
+#include "ingest/inbound_message.h"
 #include "ingest/model_registry.h"
 #include "planning/cost_table.h"
 #include "server/api/attention.h"
@@ -75,7 +75,7 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
   };
 }
 
-// The endpoints of a file: the common members, the answering function, and the other members of each row.
+// The endpoints of a part: the common members, the answering function, and the other members of each row.
 struct Rows : std::vector<TableRow> {
   template <class Answer>
   void add(Method method, std::string path, std::string operation_id, Role role, std::string summary,
@@ -96,7 +96,7 @@ std::vector<http::Endpoint> endpoints(Services* services);
 // The schemas of all endpoints.
 described::Schemas schemas();
 
-// The endpoints of each file, and the schemas that its tables make.
+// Endpoints of one kind, and the schemas that their tables make.
 struct Part {
   Rows rows;
   described::Schemas schemas = {};

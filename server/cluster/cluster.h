@@ -20,8 +20,8 @@
 #include "history/store.h"
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
+#include "ingest/inbound_message.h"
 #include "ingest/keeping.h"
-#include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
 
 namespace joulecast::server {

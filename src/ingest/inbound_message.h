@@ -6,9 +6,11 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
+#include "base/error.h"
+#include "history/store.h"
 #include "ingest/counters.h"
-#include "ingest/mission_requests.h"
 #include "telemetry/codec.h"
 #include "telemetry/datagram.h"
 
@@ -18,6 +20,13 @@ namespace joulecast::ingest {
 struct RefusedMessage {
   IngestFault fault = IngestFault::undecodable;
   std::string why;
+};
+
+// A mission event of a scheduler, requested over HTTP for a robot that announces no missions. Requests are
+// stored before they are answered; the daemon that keeps the robot carries each out once.
+struct MissionRequest {
+  signals::MissionEvent event;
+  std::int64_t request_utime_us = 0;  // host clock; increases from one request of a robot to the next
 };
 
 // A received message that passed the guard, or that came on a channel of a configured robot; or a request.
@@ -46,5 +55,17 @@ std::optional<InboundMessage> decode_message(std::string_view channel, std::span
                                              std::int64_t host_utime_us, IngestCounters& counters,
                                              const telemetry::Sender& sender = {},
                                              SignatureGate* signatures = nullptr);
+
+// The newest requests of each robot, as learned of it (history::Learned) under this topic.
+inline constexpr std::string_view mission_request_topic = "mission_requests";
+
+// Oldest first. At most telemetry::MissionTracker::memory, the newest.
+std::string mission_requests_json(std::span<const MissionRequest> requests);
+// Those stored of a robot, oldest first. Fails as Store::learned does.
+Result<std::vector<MissionRequest>> stored_mission_requests(const history::Store& store,
+                                                            std::string_view robot_id);
+
+// True if the store has the effect of an event: it begins or ends `newest`, its robot's last, or is older.
+bool has_effect(const signals::MissionEvent& event, const history::Mission& newest);
 
 }  // namespace joulecast::ingest

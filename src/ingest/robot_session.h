@@ -23,7 +23,7 @@
 #include "ingest/counters.h"
 #include "ingest/covariate_watch.h"
 #include "ingest/fleet_view.h"
-#include "ingest/mission_requests.h"
+#include "ingest/inbound_message.h"
 #include "ingest/model_registry.h"
 #include "ingest/open_mission.h"
 #include "ingest/refinement_watch.h"

@@ -17,7 +17,7 @@
 #include "history/commands.h"
 #include "history/store.h"
 #include "ingest/counters.h"
-#include "ingest/mission_requests.h"
+#include "ingest/inbound_message.h"
 #include "ingest/model_registry.h"
 #include "signals/gaps.h"
 

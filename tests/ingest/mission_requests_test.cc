@@ -1,9 +1,8 @@
 // Missions that a scheduler begins and ends over HTTP, with the robot's own events and over restarts.
 
-#include "ingest/mission_requests.h"
-
 #include <gtest/gtest.h>
 
+#include "ingest/inbound_message.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
 
