@@ -14,7 +14,6 @@
 #include "base/json_number.h"
 #include "base/try.h"
 #include "describe/input.h"
-#include "ingest/mission_requests.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"

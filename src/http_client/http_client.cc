@@ -1,5 +1,4 @@
 // <utility> comes first: Boost 1.74's awaitable.hpp uses std::exchange without including it.
-#include <utility>
 // clang-format off
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
 
 #include "plausibility/check.h"
 #include "telemetry/impossible.h"

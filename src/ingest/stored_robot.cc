@@ -8,7 +8,6 @@
 #include "base/fault_boundary.h"
 #include "base/json_number.h"
 #include "base/try.h"
-#include "ingest/model_registry.h"
 #include "ingest/refinement_watch.h"
 
 namespace joulecast::ingest {

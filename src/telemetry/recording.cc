@@ -1,11 +1,9 @@
 #include "telemetry/recording.h"
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 
 #include "base/try.h"
-#include "signals/sample.h"
 #include "telemetry/codec.h"
 
 namespace joulecast::telemetry {
