@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "answers/autonomy.h"
+#include "answers/mission.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
 #include "base/try.h"
@@ -34,13 +35,13 @@
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_review.h"
 #include "server/embedded.h"
-#include "server/fleet_events.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
 #include "server/http/http_server.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
+#include "server/http/text.h"
 #include "server/logging.h"
 #include "server/metrics.h"
 
@@ -156,6 +157,78 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
   return table;
 }
 
+// The data of the event `mission`, for a mission that has ended.
+std::string mission_event(const history::Mission& mission) {
+  return http::rounded(answers::mission_table().text(mission));
+}
+
+// Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot,
+// `contradiction` for each published contradiction, `mission` for each mission that ended at another daemon
+// of the cluster. Keeps the last values of each robot. One thread.
+class FleetEvents {
+ public:
+  // `own`: robots whose missions this daemon writes; empty: all.
+  FleetEvents(const api::Services& services, ingest::RecentValues& recent, http::EventHub& hub,
+              std::function<bool(const std::string&)> own)
+      : services_(services), recent_(recent), hub_(hub), own_(std::move(own)) {}
+
+  void publish(std::int64_t now_utime_us) {
+    std::erase_if(published_, [&](const auto& each) { return services_.fleet.find(each.first) == nullptr; });
+    recent_.keep([&](const std::string& id) { return services_.fleet.find(id) != nullptr; });
+    for (const auto& snapshot : services_.fleet.all()) {
+      recent_.take(*snapshot);
+      Published& published = published_[snapshot->robot_id];
+      const bool live = api::is_live(*snapshot, now_utime_us);
+      publish_ended(*snapshot, published);
+      if (published.snapshot == snapshot && published.live == live) continue;
+      publish_contradictions(*snapshot, published);
+      const auto model = services_.models.find(snapshot->robot_id);
+      std::optional<forecast::Reach> reach;
+      if (model != nullptr) reach = services_.forecasts.reach(model, *snapshot);
+      hub_.publish("state", http::rounded(api::state_table().text({*snapshot, reach, now_utime_us})),
+                   snapshot->robot_id, http::EventHub::Of::state);
+      published.snapshot = snapshot;
+      published.live = live;
+    }
+  }
+
+ private:
+  struct Published {
+    std::shared_ptr<const ingest::RobotSnapshot> snapshot;
+    bool live = false;
+    std::map<std::string, std::int64_t> contradictions;  // host's time when each was published
+    std::vector<history::MissionKey> ended;              // at other daemons; perhaps not stored yet
+  };
+  void publish_contradictions(const ingest::RobotSnapshot& now, Published& published) {
+    for (const ingest::Contradiction& c : now.contradictions) {
+      std::int64_t& last = published.contradictions[c.id + ' ' + c.channel];
+      if (last == c.told_utime_us) continue;
+      last = c.told_utime_us;
+      hub_.publish("contradiction", http::rounded(api::contradiction_event_table().text({now.robot_id, c})),
+                   now.robot_id);
+    }
+  }
+  void publish_ended(const ingest::RobotSnapshot& now, Published& published) {
+    if (const auto& before = published.snapshot; own_ && !own_(now.robot_id) && before != nullptr &&
+                                                 before->mission_key > 0 &&
+                                                 before->mission_key != now.mission_key)
+      published.ended.push_back(before->mission_key);
+    std::erase_if(published.ended, [&](history::MissionKey key) {
+      const auto mission = services_.store.mission(key);
+      if (!mission) return mission.error().fault == Fault::not_found;
+      if (mission->state == history::MissionState::open) return false;
+      hub_.publish("mission", mission_event(*mission), now.robot_id);
+      return true;
+    });
+  }
+
+  const api::Services& services_;
+  ingest::RecentValues& recent_;
+  http::EventHub& hub_;
+  const std::function<bool(const std::string&)> own_;
+  std::map<std::string, Published> published_;
+};
+
 }  // namespace
 
 // In the order of construction; destroyed in reverse.
@@ -204,7 +277,7 @@ struct Application::Parts {
     };
     writing.on_mission_ended = [this](const history::Mission& mission) {
       survive("mission events", [&] {
-        const std::string text = server::mission_event(mission);
+        const std::string text = mission_event(mission);
         events.publish("mission", text, mission.robot_id);
         if (webhooks) webhooks->offer("mission", mission.robot_id, mission.end_utime_us, text);
       });
@@ -573,7 +646,7 @@ struct Application::Parts {
   }
 
   void run_beat(const std::stop_token& stop) {
-    server::FleetEvents fleet_events(*services, recent, events, is_own());
+    FleetEvents fleet_events(*services, recent, events, is_own());
     do {
       survive("fleet events", [&] { fleet_events.publish(host_utime_us()); });
       survive("tokens", [&] { read_tokens(); });
