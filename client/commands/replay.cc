@@ -91,8 +91,7 @@ Result<bool> read_log(const std::string& path, LogProgress& progress, telemetry:
     return taken;
   };
   return telemetry::read_events(path, take_and_count, tally, [&](const telemetry::LogRead& place) {
-    std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
-                 static_cast<unsigned long long>(place.offset), place.message.c_str());
+    fmt::print(stderr, "joulecast: {}: at byte {}: {}\n", path, place.offset, place.message);
   });
 }
 
@@ -132,8 +131,8 @@ std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::stri
   for (const auto& robot : fleet.all()) {
     if (robot->has_model) continue;
     ++count;
-    std::fprintf(stderr, "joulecast: %s: %s has no model of this robot: pass its file with --robot\n",
-                 robot->robot_id.c_str(), store_path.c_str());
+    fmt::print(stderr, "joulecast: {}: {} has no model of this robot: pass its file with --robot\n",
+               robot->robot_id, store_path);
   }
   return count;
 }
@@ -172,7 +171,7 @@ Result<Exit> replay_into(const ReplayOptions& options) {
                                  },
                                  fleet, counters,
                                  [](const std::string& robot, const std::string& text) {
-                                   std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
+                                   fmt::print(stderr, "joulecast: {}: {}\n", robot, text);
                                  }};
   ingest::Forecasts forecasts(*store);
   outputs.prepare = [&](const std::string& robot_id) { return forecasts.read(models.find(robot_id)); };
@@ -215,7 +214,7 @@ Result<Exit> run_replay(ReplayOptions& options) {
   if (!options.into.empty()) return replay_into(options);
   InterruptGuard interrupt;
   TRY_ASSIGN(auto link, telemetry::LcmLink::open(options.lcm_url));
-  std::fprintf(stderr, "publishing on %s\n", options.lcm_url.c_str());
+  fmt::print(stderr, "publishing on {}\n", options.lcm_url);
   Pacer pacer(options.speed, options.max_rate_hz);
   telemetry::LogTally tally;
   LogProgress progress("replaying", options.logs);
@@ -235,10 +234,8 @@ Result<Exit> run_replay(ReplayOptions& options) {
   }
   if (tally.events > 0) TRY(telemetry::need_robots(options.logs.front(), tally));
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
-  std::printf("replayed %llu messages on %s in %.1f s; %llu damaged places, %llu bytes skipped\n",
-              static_cast<unsigned long long>(tally.events), options.lcm_url.c_str(), wall_s,
-              static_cast<unsigned long long>(tally.damaged_places),
-              static_cast<unsigned long long>(tally.skipped_bytes));
+  fmt::print("replayed {} messages on {} in {:.1f} s; {} damaged places, {} bytes skipped\n", tally.events,
+             options.lcm_url, wall_s, tally.damaged_places, tally.skipped_bytes);
   return tally.damaged_places == 0 ? Exit::ok : Exit::fault;
 }
 

@@ -186,8 +186,8 @@ struct Outlets {
 
 void print_effects() {
   for (const auto& entry : vr::all_effects())
-    std::printf("%-26s %-10s up to %g%s\n", std::string(entry.id).c_str(), std::string(entry.unit).c_str(),
-                entry.search_limit, entry.outside ? "  (outside the catalogue)" : "");
+    fmt::print("{:<26} {:<10} up to {:g}{}\n", entry.id, entry.unit, entry.search_limit,
+               entry.outside ? "  (outside the catalogue)" : "");
 }
 
 Result<void> write_truth(const SimulateOptions& options, const std::vector<FleetMember>& members,
@@ -267,10 +267,10 @@ std::vector<vr::SimulationSpec> timed_specs(const std::vector<FleetMember>& memb
 
 void announce(const std::vector<vr::SimulationSpec>& specs, const std::string& lcm_url) {
   for (const auto& spec : specs)
-    std::printf("%s: %g kg, up to %g m/s, %g V\n", spec.robot.robot_id.c_str(),
-                spec.robot.chassis_kg + 2 * spec.robot.wheel_kg, spec.robot.speed_limit_m_s,
-                spec.robot.nominal_voltage_v);
-  std::printf("publishing on %s; ctrl-C stops\n", lcm_url.c_str());
+    fmt::print("{}: {:g} kg, up to {:g} m/s, {:g} V\n", spec.robot.robot_id,
+               spec.robot.chassis_kg + 2 * spec.robot.wheel_kg, spec.robot.speed_limit_m_s,
+               spec.robot.nominal_voltage_v);
+  fmt::print("publishing on {}; ctrl-C stops\n", lcm_url);
   std::fflush(stdout);
 }
 
