@@ -69,9 +69,9 @@ void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> name
 // Refuses a list of which two items have the same name; an empty one is none.
 template <class Items, class Name>
 void refuse_repeated(Fields& fields, const char* list, const Items& items, Name name) {
-  std::set<std::string_view> names;
+  std::set<std::string> names;
   for (std::size_t k = 0; k < items.size(); ++k)
-    if (const std::string& own = std::invoke(name, items[k]); !own.empty() && !names.insert(own).second)
+    if (const std::string own = std::invoke(name, items[k]); !own.empty() && !names.insert(own).second)
       fields.fault(fmt::format("{}/{}", list, k), fmt::format("is \"{}\" again, must be unique", own));
 }
 

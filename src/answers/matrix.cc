@@ -255,7 +255,10 @@ const auto matrix_input =
             },
             tasks_of_matrix, "the columns", matrix_task_input)
         .check([](Fields& fields, MatrixInput& matrix, MatrixContext&) {
-          refuse_repeated(fields, "robots", matrix.robots, &Robot::robot_id);
+          // A robot may have rows of several stated poses or charges.
+          refuse_repeated(fields, "robots", matrix.robots, [](const Robot& robot) {
+            return robot.pose || robot.state_of_charge ? "" : robot.robot_id;
+          });
           refuse_repeated(fields, "tasks", matrix.task_ids, std::identity());
         });
 

@@ -315,7 +315,7 @@ TEST_F(MatrixAnswer, UsualDrivingPricesAMillion) {
 
 TEST_F(MatrixAnswer, StopsAfterTheClientLeft) {
   json request = {{"robots", json::array()}, {"tasks", {stations_}}};
-  for (int k = 0; k < 100; ++k) request["robots"].push_back("a");
+  for (int k = 0; k < 100; ++k) request["robots"].push_back({{"robot_id", "a"}, {"state_of_charge", 0.5}});
   MatrixText answer = text_of(request);
   std::stop_source client;
   std::string text;
