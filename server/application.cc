@@ -162,6 +162,8 @@ std::string mission_event(const history::Mission& mission) {
   return http::rounded(answers::mission_table().text(mission));
 }
 
+}  // namespace
+
 // Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot,
 // `contradiction` for each published contradiction, `mission` for each mission that ended at another daemon
 // of the cluster. Keeps the last values of each robot. One thread.
@@ -228,8 +230,6 @@ class FleetEvents {
   const std::function<bool(const std::string&)> own_;
   std::map<std::string, Published> published_;
 };
-
-}  // namespace
 
 // In the order of construction; destroyed in reverse.
 struct Application::Parts {
