@@ -322,8 +322,7 @@ const auto task_input =
         "drive, then dwell; each task begins where the one before ended; a path, or distances and turns, "
         "or a pick-up and a drop-off, or dwell_s alone")
         .named("task")
-        .text("task_id", &AutonomyTask::task_id, max_id_bytes,
-              "the caller's name of the task, of one task only", "")
+        .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
         .number("payload_kg", &AutonomyTask::payload_kg, payload_kg_bounds,
                 "carried from here on, absent: as before; with pickup, from there to dropoff, absent: none")
         .include(pace_input, &AutonomyTask::pace)
@@ -396,10 +395,7 @@ const auto autonomy_input =
         })
         .list("tasks", AT(input.tasks), tasks_of_autonomy,
               "tasks in the order of execution; null or absent: no task forecast", task_input,
-              described::Presence::optional)
-        .check([](Fields& fields, AutonomyRequest& request, AutonomyContext&) {
-          refuse_repeated(fields, "tasks", request.input.tasks, &AutonomyTask::task_id);
-        });
+              described::Presence::optional);
 
 using described::Table;
 using forecast::Outlook;

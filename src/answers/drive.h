@@ -1,13 +1,8 @@
 #pragma once
 
-#include <fmt/format.h>
-
 #include <array>
-#include <functional>
 #include <initializer_list>
 #include <optional>
-#include <set>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -65,15 +60,6 @@ inline constexpr Bounds value_of_time_bounds_w{.minimum = 0, .maximum = most_val
 
 // Refuses these members, which apply only to a planned motion.
 void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> names);
-
-// Refuses a list of which two items have the same name; an empty one is none.
-template <class Items, class Name>
-void refuse_repeated(Fields& fields, const char* list, const Items& items, Name name) {
-  std::set<std::string> names;
-  for (std::size_t k = 0; k < items.size(); ++k)
-    if (const std::string own = std::invoke(name, items[k]); !own.empty() && !names.insert(own).second)
-      fields.fault(fmt::format("{}/{}", list, k), fmt::format("is \"{}\" again, must be unique", own));
-}
 
 // The context of the reader of a way.
 struct PathContext {

@@ -138,8 +138,7 @@ void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
 
 const auto matrix_task_input =
     Input<ReadTask, MatrixContext>()
-        .text("task_id", &ReadTask::task_id, max_task_id_bytes,
-              "the caller's name of the task, of one task only")
+        .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
         .number("payload_kg", AT(task.payload_kg), {.minimum = 0, .maximum = 1e5},
                 "carried from the pick-up to the drop-off", 0)
         .include(stations_input(), AT(task.stations))
@@ -253,14 +252,7 @@ const auto matrix_input =
               matrix.tasks.push_back(std::move(read.task));
               matrix.former = matrix.former || read.former;
             },
-            tasks_of_matrix, "the columns", matrix_task_input)
-        .check([](Fields& fields, MatrixInput& matrix, MatrixContext&) {
-          // A robot may have rows of several stated poses or charges.
-          refuse_repeated(fields, "robots", matrix.robots, [](const Robot& robot) {
-            return robot.pose || robot.state_of_charge ? "" : robot.robot_id;
-          });
-          refuse_repeated(fields, "tasks", matrix.task_ids, std::identity());
-        });
+            tasks_of_matrix, "the columns", matrix_task_input);
 
 }  // namespace
 

@@ -327,10 +327,6 @@ TEST_F(AutonomyAnswer, FaultsNameTheField) {
   EXPECT_EQ(fault({{"tasks", {{{"turns_rad", {90}}}}}}, &live_).field, "/tasks/0/turns_rad/0");
   EXPECT_EQ(fault({{"tasks", {{{"path", {{{"kind", "turn"}, {"angle_rad", -13}}}}}}}}, &live_).field,
             "/tasks/0/path/0/angle_rad");
-  const Error twice =
-      fault({{"tasks", {{{"task_id", "t"}, {"dwell_s", 1}}, {{"task_id", "t"}, {"dwell_s", 2}}}}}, &live_);
-  EXPECT_EQ(twice.field, "/tasks/1");
-  EXPECT_EQ(twice.message, "is \"t\" again, must be unique");
   EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");
   EXPECT_EQ(fault({{"confidence", 1}}, &live_).field, "/confidence");
   EXPECT_EQ(fault({{"to_charger_m", 5}, {"tasks", {{{"distances_m", {5}}}}}}, &live_).field,
