@@ -16,7 +16,6 @@ constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t most_windows = 3000;  // more add little information and make a fit slow
 constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
 // Rows as far apart as this show parts of a ramp: the motion is then known between rows only.
-constexpr double far_apart_s = 0.125;
 constexpr std::size_t rows_a_window = 4;
 
 // Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
@@ -119,7 +118,7 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   // Inertias need accelerations of regular windows: a line about a reading attenuates them.
   windows::Readings regular = p.readings;
   regular.battery_power = false;
-  const bool far = p.readings.row_s > far_apart_s && !p.readings.battery_held;
+  const bool far = p.readings.row_s > windows::far_apart_s && !p.readings.battery_held;
   if (far) settings.fewest_samples = rows_a_window;
   p.windows = windows::make_windows(driven, robot, regular, settings);
   if (far) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "statistics/robust.h"
@@ -12,6 +13,7 @@
 namespace joulecast::windows {
 namespace {
 
+constexpr std::size_t kept_together = 50;  // windows, where some are left out
 // A row of power is shorter than most events of a drive and longer than the time scale of a controller. The
 // line about a reading covers at least five rows.
 constexpr double shortest_power_row_s = 0.5, line_rows = 2.2;

@@ -12,148 +12,105 @@ namespace {
 
 constexpr double few = 0.2;  // of the windows: a channel with fewer readings is not used
 
-// Samples of a mission with known wheel speeds.
-struct Speeds {
-  std::vector<double> time_s;
-  std::array<std::vector<double>, 2> speed;
+// Half of the line about a reading.
+double half_line_s(double period_s) {
+  return std::max(line_s, line_rows * period_s);
+}
 
-  explicit Speeds(const windows::Track& c) {
-    for (std::size_t k = 0; k < c.time_s.size(); ++k) {
-      if (!std::isfinite(c.speed[0][k] + c.speed[1][k])) continue;
-      time_s.push_back(c.time_s[k]);
-      for (const std::size_t s : {0u, 1u}) speed[s].push_back(c.speed[s][k]);
-    }
+// The motion at one sample.
+Window instant_at(const windows::Track& c, std::size_t k, double period_s) {
+  const double half_s = half_line_s(period_s);
+  Window w;
+  w.t_s = c.time_s[k];
+  w.length_s = period_s;
+  w.payload_kg = c.payload[k];
+  for (const std::size_t s : {0u, 1u}) {
+    windows::Line line = windows::line_at(c.time_s, c.speed[s], w.t_s, half_s);
+    if (!std::isfinite(line.value)) line = {c.speed[s][k], 0};
+    w.speed_rad_s[s] = line.value;
+    w.acceleration_rad_s2[s] = line.slope;
+    w.resting[s] = std::fabs(line.value) < windows::resting_rad_s;
+    w.moving[s] = std::fabs(c.speed[s][k]) > windows::moving_rad_s;
   }
+  for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = c.motion[q][k];
+  w.x_m = c.x[k];
+  w.y_m = c.y[k];
+  w.heading_rad = c.heading[k];
+  w.climb_rad = c.climb[k];
+  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(covariate[k]);
+  return w;
+}
 
-  // By a line through the samples within +-half_s, or through the samples beside the instant.
-  double at(std::size_t side, double at_s, double half_s) const {
-    const std::vector<double>&t = time_s, &v = speed[side];
-    if (const double mean = windows::line_at(t, v, at_s, half_s, 2).value; std::isfinite(mean)) return mean;
-    const auto next = std::ranges::lower_bound(t, at_s) - t.begin();
-    const auto k = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(next, 1, std::ssize(t) - 1));
-    return std::lerp(v[k - 1], v[k], (at_s - t[k - 1]) / (t[k] - t[k - 1]));
-  }
-};
-
-// What a reading of battery power is: the power at its instant, or the mean since the last reading.
-enum class Reading { of_instant, since_last };
-
-// Rows of one mission's battery power.
-class MissionPower {
- public:
-  MissionPower(const windows::Track& track, double period_s, double voltage_v, std::size_t mission)
-      : c_(track),
-        speeds_(track),
-        piece_s_(std::max(shortest_piece_s, period_s)),
-        voltage_v_(voltage_v),
-        mission_(mission),
-        fresh_(statistics::find_updates(c_.time_s, c_.battery_current)) {
-    std::erase_if(fresh_.at, [&](std::size_t k) {
-      return !std::isfinite(c_.battery_power[k] + c_.speed[0][k] + c_.speed[1][k]);
-    });
-    row_length_s_ = fresh_.held ? fresh_.period_s : std::max(row_s, row_readings * fresh_.period_s);
-  }
-
-  double expected_rows() const { return fresh_.at.empty() ? 0 : c_.time_s.back() / row_length_s_; }
-
-  // `position` counts rows over all missions, kept or not.
-  void add(Reading reading, std::size_t keep_every, std::size_t& position, PowerRows& rows) const {
-    const std::vector<std::size_t>& at = fresh_.at;
-    const auto row_of = [&](std::size_t n) {
-      return fresh_.held ? static_cast<double>(n) : std::floor(c_.time_s[at[n]] / row_length_s_);
-    };
-    double last_s = -1e300;
-    for (std::size_t n = 1; n < at.size();) {
-      const bool kept = position++ / windows::kept_together % keep_every == 0;
-      double energy_j = 0, known_s = 0;
-      Span open{};
-      const double row = row_of(n);
-      const std::size_t first = rows.instants.size();
-      for (; n < at.size() && row_of(n) == row; ++n) {
-        const std::optional<Span> span = kept ? span_of(n, reading) : std::nullopt;
-        if (!span) continue;
-        if (span->from_s > open.to_s + 1e-9) add_motion(open, rows), open = *span;
-        open.to_s = span->to_s;
-        energy_j += span->length_s() * power_w(n, reading);
-        known_s += span->length_s();
-      }
-      add_motion(open, rows);
-      if (rows.instants.size() == first) continue;
-      Window& begin = rows.instants[first];
-      begin.continues = begin.t_s - last_s < 2 * row_length_s_;
-      last_s = begin.t_s;
-      rows.first.push_back(rows.instants.size());
-      rows.power_w.push_back(energy_j / known_s);
-    }
-  }
-
- private:
-  struct Span {
-    double from_s = 0, to_s = 0;
-    double length_s() const { return to_s - from_s; }
+void add_readings(const windows::Track& c, double period_s, double voltage_v, std::size_t mission,
+                  double least_row_s, PowerRows& rows) {
+  statistics::Updates fresh = statistics::find_updates(c.time_s, c.battery_current);
+  std::vector<std::size_t>& at = fresh.at;
+  std::erase_if(
+      at, [&](std::size_t k) { return !std::isfinite(c.battery_power[k] + c.speed[0][k] + c.speed[1][k]); });
+  const double length_s = fresh.held && least_row_s < fresh.period_s
+                              ? 0
+                              : std::max({row_s, row_readings * fresh.period_s, least_row_s});
+  const auto row_of = [&](std::size_t n) {
+    return length_s > 0 ? std::floor(c.time_s[at[n]] / length_s) : static_cast<double>(n);
   };
-
-  // The time that a reading stands for. An instant lasts a piece where the motion is known between readings;
-  // where each sample has a reading, two instants stand for the time between them.
-  std::optional<Span> span_of(std::size_t n, Reading reading) const {
-    const double before_s = c_.time_s[fresh_.at[n - 1]], at_s = c_.time_s[fresh_.at[n]];
-    if (fresh_.held && reading == Reading::of_instant) return Span{at_s - piece_s_ / 2, at_s + piece_s_ / 2};
-    if (at_s - before_s > 1.5 * fresh_.period_s + 1e-9) return std::nullopt;
-    return Span{before_s, at_s};
-  }
-  double power_w(std::size_t n, Reading reading) const {
-    const double p = c_.battery_power[fresh_.at[n]];
-    return fresh_.held || reading == Reading::since_last ? p : (p + c_.battery_power[fresh_.at[n - 1]]) / 2;
-  }
-
-  // Pieces of a span in which the speeds change linearly.
-  void add_motion(const Span& span, PowerRows& rows) const {
-    if (!(span.length_s() > 0)) return;
-    const double count = std::max(1.0, std::round(span.length_s() / piece_s_));
-    const double step_s = span.length_s() / count;
-    const auto knot = [&](double n) {
-      const double at_s = span.from_s + n * step_s, half_s = step_s / 2;
-      return std::array{speeds_.at(0, at_s, half_s), speeds_.at(1, at_s, half_s)};
-    };
-    for (double n = 0; n < count; ++n) {
-      const auto from = knot(n), to = knot(n + 1);
-      Window& w = rows.instants.emplace_back();
-      w.t_s = span.from_s + (n + 0.5) * step_s;
-      w.length_s = step_s;
-      w.mission = mission_;
-      w.battery_voltage_v = voltage_v_;
-      for (const std::size_t s : {0u, 1u}) {
-        const double slowest = std::min(std::fabs(from[s]), std::fabs(to[s]));
-        const double fastest = std::max(std::fabs(from[s]), std::fabs(to[s]));
-        w.speed_rad_s[s] = (from[s] + to[s]) / 2;
-        w.acceleration_rad_s2[s] = (to[s] - from[s]) / step_s;
-        w.resting[s] = fastest < windows::resting_rad_s;
-        w.moving[s] = from[s] * to[s] > 0 && slowest > windows::moving_rad_s;
-      }
-      add_state(w);
+  double last_s = 0;
+  for (std::size_t n = 0; n < at.size();) {
+    std::size_t end = n;
+    double sum = 0;
+    for (; end < at.size() && row_of(end) == row_of(n); ++end) sum += c.battery_power[at[end]];
+    const std::size_t count = end - n, instants = std::min(count, row_instants);
+    for (std::size_t k = 0; k < instants; ++k) {
+      rows.instants.push_back(instant_at(c, at[n + (2 * k + 1) * count / (2 * instants)], period_s));
+      rows.instants.back().mission = mission;
+      rows.instants.back().battery_voltage_v = voltage_v;
     }
+    Window& row = rows.instants[rows.first.back()];
+    row.continues = n > 0 && row.t_s - last_s < 2 * std::max(length_s, fresh.period_s);
+    last_s = row.t_s;
+    rows.first.push_back(rows.instants.size());
+    rows.power_w.push_back(sum / static_cast<double>(count));
+    n = end;
   }
+}
 
-  // What the model needs besides the wheels' motion, of the sample at the window's middle or after it.
-  void add_state(Window& w) const {
-    const auto next = std::ranges::lower_bound(c_.time_s, w.t_s) - c_.time_s.begin();
-    const auto k = static_cast<std::size_t>(std::min(next, std::ssize(c_.time_s) - 1));
-    w.payload_kg = c_.payload[k];
-    for (std::size_t q = 0; q < c_.motion.size(); ++q) w.recent_rad_s[q] = c_.motion[q][k];
-    w.x_m = c_.x[k];
-    w.y_m = c_.y[k];
-    w.heading_rad = c_.heading[k];
-    w.climb_rad = c_.climb[k];
-    for (const std::vector<double>& covariate : c_.covariates) w.covariates.push_back(covariate[k]);
+// Rows between samples that are far apart: speeds change linearly from one to the next, and a sample's power
+// is the mean over a period that begins `phase` of a period before it. 1 stands for a mean since the last
+// sample, 0.5 for one about the sample.
+void add_intervals(const windows::Track& c, double period_s, double voltage_v, std::size_t mission,
+                   double least_row_s, double phase, PowerRows& rows) {
+  const double length_s = std::max({row_s, row_readings * period_s, least_row_s});
+  const auto known = [&](std::size_t k) {
+    return std::isfinite(c.battery_power[k] + c.speed[0][k] + c.speed[1][k]);
+  };
+  double last = -2, energy_j = 0, known_s = 0;
+  const auto finish = [&] {
+    if (known_s > 0) rows.first.push_back(rows.instants.size()), rows.power_w.push_back(energy_j / known_s);
+    energy_j = known_s = 0;
+  };
+  for (std::size_t k = 1; k < c.time_s.size(); ++k) {
+    const double step_s = c.time_s[k] - c.time_s[k - 1];
+    if (!known(k - 1) || !known(k) || step_s > 1.5 * period_s) continue;
+    const double row = std::floor(c.time_s[k] / length_s);
+    if (row != last) finish();
+    Window& w = rows.instants.emplace_back(instant_at(c, k, period_s));
+    w.continues = row == last + 1;
+    w.t_s = c.time_s[k] - step_s / 2;
+    w.length_s = step_s;
+    w.mission = mission;
+    w.battery_voltage_v = voltage_v;
+    for (const std::size_t s : {0u, 1u}) {
+      const double from = c.speed[s][k - 1], to = c.speed[s][k];
+      w.speed_rad_s[s] = (from + to) / 2;
+      w.acceleration_rad_s2[s] = (to - from) / step_s;
+      w.resting[s] = std::max(std::fabs(from), std::fabs(to)) < windows::resting_rad_s;
+      w.moving[s] = from * to > 0 && std::min(std::fabs(from), std::fabs(to)) > windows::moving_rad_s;
+    }
+    energy_j += step_s * (phase * c.battery_power[k] + (1 - phase) * c.battery_power[k - 1]);
+    known_s += step_s;
+    last = row;
   }
-
-  const windows::Track& c_;
-  Speeds speeds_;
-  double piece_s_, voltage_v_;
-  std::size_t mission_;
-  statistics::Updates fresh_;  // with known power and speeds
-  double row_length_s_;
-};
+  finish();
+}
 
 // Mean square of the power that a regression on the plain terms leaves [W^2].
 double left_by_regression(const PowerRows& rows, double wheel_radius_m) {
@@ -195,34 +152,30 @@ std::size_t assign(std::span<Window> windows, std::span<const double> length_s) 
   return blocks;
 }
 
-// Change of a speed per second over a span, between means of its length about its ends; by every `step`-th
-// sample from `first` on. NaN where an end has no sample.
-double change_of(const windows::Track& c, std::size_t side, double middle_s, double length_s,
-                 std::size_t first, std::size_t step) {
-  double change = 0, lasts_s = 0;
-  for (const double end : {-1.0, 1.0}) {
-    const double from_s = middle_s + (end - 1) * length_s / 2, to_s = from_s + length_s;
-    auto k = static_cast<std::size_t>(std::ranges::lower_bound(c.time_s, from_s - 1e-9) - c.time_s.begin());
-    k += (first + step - k % step) % step;
-    double sum = 0, sum_s = 0, count = 0;
-    for (; k < c.time_s.size() && c.time_s[k] <= to_s + 1e-9; k += step)
-      if (std::isfinite(c.speed[side][k])) sum += c.speed[side][k], sum_s += c.time_s[k], ++count;
-    if (count == 0) return windows::missing;
-    change += end * sum / count;
-    lasts_s += end * sum_s / count;
-  }
-  return change / lasts_s;
-}
+// Every other sample of a mission's wheel speeds, from the first or the second on.
+struct Half {
+  std::vector<double> time_s;
+  std::array<std::vector<double>, 2> speed;
 
-// Replaces the accelerations by those expected given the noise of the speeds. A change a over longer spans
-// predicts that over the pieces by q a, q = sum a1 b2 / sum a a over the rows, each change times the speed: 1
-// of one half of the samples, 2 of the other, a of the longer and b of the shortest spans. Noise that is
-// independent from sample to sample is in the denominator alone. Of the spans, those that predict best,
-// longer ones by `clear_gain`.
+  Half(const windows::Track& c, std::size_t first) {
+    for (std::size_t k = first; k < c.time_s.size(); k += 2) {
+      time_s.push_back(c.time_s[k]);
+      for (const std::size_t s : {0u, 1u}) speed[s].push_back(c.speed[s][k]);
+    }
+  }
+};
+
+// Replaces the accelerations by those expected given the noise of the speeds. A slope a of longer lines
+// predicts that of the shortest lines by q a, q = sum a1 b2 / sum a a over the rows, each slope times the
+// speed: 1 of one half of the samples, 2 of the other, a of the longer and b of the shortest lines. Noise
+// that is independent from sample to sample is in the denominator alone. Of the lengths, the one that
+// predicts best, a longer one by `clear_gain`.
 void expect_accelerations(std::span<const windows::Track> tracks, PowerRows& rows) {
+  std::vector<std::array<Half, 2>> halves;
+  for (const windows::Track& c : tracks) halves.push_back({Half(c, 0), Half(c, 1)});
   double most = 0;
   std::vector<std::array<double, 2>> best;
-  for (const double longer : span_lengths) {
+  for (const double longer : line_lengths) {
     std::vector<std::array<double, 2>> slope(rows.instants.size());
     double product = 0, square = 0;
     for (std::size_t r = 0; r < rows.size(); ++r) {
@@ -230,13 +183,13 @@ void expect_accelerations(std::span<const windows::Track> tracks, PowerRows& row
         double whole = 0, first = 0, second = 0, speed = 0;
         for (std::size_t k = rows.first[r]; k < rows.first[r + 1]; ++k) {
           const Window& w = rows.instants[k];
-          const auto change = [&](double times, std::size_t from, std::size_t step) {
-            return change_of(tracks[w.mission], s, w.t_s, times * w.length_s, from, step);
-          };
-          slope[k][s] = longer == 1 ? w.acceleration_rad_s2[s] : change(longer, 0, 1);
+          const windows::Track& c = tracks[w.mission];
+          const auto& [one, two] = halves[w.mission];
+          const double half_s = half_line_s(w.length_s);
+          slope[k][s] = windows::line_at(c.time_s, c.speed[s], w.t_s, longer * half_s).slope;
           whole += slope[k][s];
-          first += change(longer, 0, 2);
-          second += change(1, 1, 2);
+          first += windows::line_at(one.time_s, one.speed[s], w.t_s, longer * half_s, 2).slope;
+          second += windows::line_at(two.time_s, two.speed[s], w.t_s, half_s, 2).slope;
           speed += w.speed_rad_s[s];
         }
         if (!std::isfinite(speed * whole * first * second)) continue;
@@ -307,8 +260,10 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
 
   std::vector<double> length_s, voltage_v, period_s;
   std::vector<windows::Track> tracks;
+  double total_s = 0;
   for (const telemetry::Recording& mission : missions) {
     length_s.push_back(telemetry::length_s(mission));
+    total_s += length_s.back();
     period_s.push_back(windows::median_period_s(mission));
     tracks.push_back(windows::make_track(mission, robot, d.covariates, period_s.back(), {}));
     const double mean_v = tracks.back().mean_battery_voltage_v;
@@ -321,22 +276,26 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   if (d.motors) {
     d.rows = rows_of(d.windows, robot);
   } else {
-    double expected_rows = 0, least = std::numeric_limits<double>::infinity();
-    std::vector<MissionPower> powers;
-    for (std::size_t m = 0; m < missions.size(); ++m) {
-      powers.emplace_back(tracks[m], period_s[m], voltage_v[m], m);
-      expected_rows += powers.back().expected_rows();
-    }
-    const auto keep_every = static_cast<std::size_t>(
-        std::max(1.0, std::ceil(expected_rows / static_cast<double>(most_power_rows))));
-    for (const Reading reading : {Reading::of_instant, Reading::since_last}) {
+    const double least_row_s = total_s / static_cast<double>(most_power_rows);
+    const auto rows_by = [&](double phase) {
       PowerRows rows;
-      std::size_t position = 0;
-      for (const MissionPower& power : powers) power.add(reading, keep_every, position, rows);
-      const double left = left_by_regression(rows, robot.kinematics.wheel_radius_m);
-      if (left < least) least = left, d.rows = std::move(rows);
+      for (std::size_t m = 0; m < missions.size(); ++m)
+        add_intervals(tracks[m], period_s[m], voltage_v[m], m, least_row_s, phase, rows);
+      return rows;
+    };
+    const auto left_by = [&](const PowerRows& rows) {
+      return left_by_regression(rows, robot.kinematics.wheel_radius_m);
+    };
+    // Recorders of few rows state the power of an instant, or its mean since the last row.
+    PowerRows means;
+    if (readings.row_s > windows::far_apart_s && !readings.battery_held) means = rows_by(1);
+    if (means.size() > 0 && left_by(means) < left_by(rows_by(0.5))) {
+      d.rows = std::move(means);
+    } else {
+      for (std::size_t m = 0; m < missions.size(); ++m)
+        add_readings(tracks[m], period_s[m], voltage_v[m], m, least_row_s, d.rows);
+      expect_accelerations(tracks, d.rows);
     }
-    expect_accelerations(tracks, d.rows);
     d.blocks = assign(d.rows.instants, length_s);
   }
   d.power = d.rows.size() >= fewest_rows;
