@@ -15,8 +15,7 @@ namespace {
 constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t most_windows = 3000;  // more add little information and make a fit slow
 constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
-// Rows as far apart as this show parts of a ramp: the motion is then known between rows only.
-constexpr std::size_t rows_a_window = 4;
+constexpr std::size_t rows_a_window = 4;    // where rows are far apart
 
 // Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
 // assumed, on the wide side. Parameters that the recordings show well do not depend on them.
