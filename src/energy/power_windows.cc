@@ -15,7 +15,9 @@ namespace {
 constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t most_windows = 3000;  // more add little information and make a fit slow
 constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
-constexpr std::size_t rows_a_window = 4;    // where rows are far apart
+// Rows as far apart as this [s] show parts of a ramp: the motion is then known between rows only.
+constexpr double far_apart_s = 0.125;
+constexpr std::size_t rows_a_window = 4;  // where rows are far apart
 
 // Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
 // assumed, on the wide side. Parameters that the recordings show well do not depend on them.
@@ -114,12 +116,9 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   p.readings = windows::find_readings(driven);
   windows::WindowSettings settings;
   settings.most_windows = most_windows;
-  // Inertias need accelerations of regular windows: a line about a reading attenuates them.
-  windows::Readings regular = p.readings;
-  regular.battery_power = false;
-  const bool far = p.readings.row_s > windows::far_apart_s && !p.readings.battery_held;
+  const bool far = p.readings.row_s > far_apart_s && !p.readings.battery_held;
   if (far) settings.fewest_samples = rows_a_window;
-  p.windows = windows::make_windows(driven, robot, regular, settings);
+  p.windows = windows::make_windows(driven, robot, p.readings, settings);
   if (far) {
     p.windows = between_rows(driven, std::move(p.windows), phase);
     p.phase = phase;

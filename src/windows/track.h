@@ -47,10 +47,8 @@ double median_period_s(const telemetry::Recording& mission);
 Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,
                  std::span<const std::string> covariates, double period_s, const WindowSettings& settings);
 
-inline constexpr double fewest_rows = 4;      // a window lasts, as its outermost have no weight
-inline constexpr double moving_rad_s = 0.10;  // slowest wheel that surely turns
-// Rows as far apart as this [s] show parts of a ramp: the motion is then known between rows only.
-inline constexpr double far_apart_s = 0.125;
+inline constexpr double fewest_rows = 4;       // a window lasts, as its outermost have no weight
+inline constexpr double moving_rad_s = 0.10;   // slowest wheel that surely turns
 inline constexpr double resting_rad_s = 0.03;  // fastest wheel that surely stands
 // Turned since it stood, from which on a wheel slides: before that dry friction builds up as contacts bend
 // (Canudas de Wit and others 1995).

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
 #include <utility>
 
 #include "statistics/robust.h"
@@ -14,9 +13,6 @@ namespace joulecast::windows {
 namespace {
 
 constexpr std::size_t kept_together = 50;  // windows, where some are left out
-// A row of power is shorter than most events of a drive and longer than the time scale of a controller. The
-// line about a reading covers at least five rows.
-constexpr double shortest_power_row_s = 0.5, line_rows = 2.2;
 
 // Mean of a column within +-half_s of an instant.
 double mean_near(const Track& c, const std::vector<double>& v, double t, double half_s) {
@@ -151,60 +147,6 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
   w.voltage_slope_v_s = w.current_slope_a_s = {};
 }
 
-// Readings of the battery at these rows, ascending, of [from_s, from_s + length_s), and the motion about
-// them; empty if the motion is not available.
-std::optional<Window> power_row(const Track& c, std::span<const std::size_t> rows, double from_s,
-                                double length_s, double half_s) {
-  const auto count = static_cast<double>(rows.size());
-  const auto mean = [&](const std::vector<double>& v) {
-    double sum = 0;
-    for (const std::size_t k : rows) sum += v[k];
-    return sum / count;
-  };
-  Window w;
-  w.t_s = mean(c.time_s);
-  w.length_s = length_s;
-  w.reading = w.motors_apart = true;
-  w.part_weight = {};
-  std::array<double, 3> part_time_s{};
-  for (const std::size_t k : rows) {
-    const double third = std::floor(3 * (c.time_s[k] - from_s) / length_s);
-    const auto part = static_cast<std::size_t>(std::clamp(third, 0.0, 2.0));
-    ++w.part_weight[part];
-    part_time_s[part] += c.time_s[k];
-  }
-  for (const std::size_t s : {0u, 1u}) {
-    w.moving[s] = w.resting[s] = true;
-    double slowest = std::numeric_limits<double>::infinity(), fastest = -slowest;
-    for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
-      if (w.part_weight[part] == 0) continue;
-      Line line = line_at(c.time_s, c.speed[s], part_time_s[part] / w.part_weight[part], half_s);
-      if (!std::isfinite(line.value)) return std::nullopt;
-      if (std::fabs(line.value) < resting_rad_s) line = {0, 0};
-      w.resting[s] = w.resting[s] && line.value == 0;
-      slowest = std::min(slowest, line.value);
-      fastest = std::max(fastest, line.value);
-      w.part_speed_rad_s[part][s] = line.value;
-      w.part_acceleration_rad_s2[part][s] = line.slope;
-      w.speed_rad_s[s] += line.value * w.part_weight[part] / count;
-      w.acceleration_rad_s2[s] += line.slope * w.part_weight[part] / count;
-    }
-    w.moving[s] = slowest > moving_rad_s || fastest < -moving_rad_s;
-  }
-  for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
-    w.part_weight[part] /= count;
-    if (w.part_weight[part] > 0) continue;
-    w.part_speed_rad_s[part] = w.speed_rad_s;
-    w.part_acceleration_rad_s2[part] = w.acceleration_rad_s2;
-  }
-  set_means(c, mean, w);
-  return w;
-}
-
-double power_row_s(double reading_period_s) {
-  return std::max(shortest_power_row_s, 2 * reading_period_s);
-}
-
 double window_length_s(const WindowSettings& settings, double period_s) {
   return std::max(settings.length_s, static_cast<double>(settings.fewest_samples) * period_s);
 }
@@ -242,7 +184,7 @@ class MissionWindows {
         continue;
       }
       Window w = window_at(track_, at);
-      if (readings_.battery_held || readings_.power_rows()) forget_battery(w);
+      if (readings_.battery_held) forget_battery(w);
       if (readings_.motors_held) forget_motors(w);
       if (k % windows_a_span == 0) add_span(track_, settings_, robot_, w);
       add(windows, w, continues);
@@ -272,31 +214,6 @@ class MissionWindows {
       w.yaw_rate_rad_s = missing;
       add(windows, w, t[row] - last_s < 1.5 * readings_.period_s);
       last_s = t[row];
-    }
-  }
-
-  void add_power_rows(std::vector<Window>& windows, std::size_t& position, std::size_t keep_every) const {
-    const std::vector<double>& t = track_.time_s;
-    const auto updates = statistics::find_updates(t, track_.battery_current);
-    const double length = power_row_s(updates.period_s),
-                 half = std::max(settings_.length_s, line_rows * period_s_);
-    double last = -2, next_span = 0;
-    std::vector<std::size_t> rows;
-    for (std::size_t k = 0; k < updates.at.size();) {
-      const double row = std::floor(t[updates.at[k]] / length);
-      rows.clear();
-      for (; k < updates.at.size() && std::floor(t[updates.at[k]] / length) == row; ++k)
-        if (std::isfinite(track_.battery_power[updates.at[k]])) rows.push_back(updates.at[k]);
-      const bool kept = position++ / kept_together % keep_every == 0;
-      if (!kept || rows.empty()) continue;
-      auto w = power_row(track_, rows, row * length, length, half);
-      if (!w) continue;
-      if (row >= next_span) {
-        add_span(track_, settings_, robot_, *w);
-        next_span = row + settings_.span_s / length;
-      }
-      add(windows, *w, row == last + 1);
-      last = row;
     }
   }
 
@@ -384,13 +301,9 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings) {
-  const bool regular = !readings.power_rows() || readings.motor_voltages;
   double expected = 0;
-  for (const telemetry::Recording& mission : missions) {
-    const double row_s = median_period_s(mission);
-    expected += telemetry::length_s(mission) *
-                (regular ? 2 / window_length_s(settings, row_s) : 1 / power_row_s(row_s));
-  }
+  for (const telemetry::Recording& mission : missions)
+    expected += 2 * telemetry::length_s(mission) / window_length_s(settings, median_period_s(mission));
   const auto keep_every = static_cast<std::size_t>(
       std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
   const std::vector<std::string> covariates = covariate_names(missions);
@@ -398,12 +311,8 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
   std::size_t position = 0;
   for (std::size_t m = 0; m < missions.size(); ++m) {
     const MissionWindows mission(missions[m], m, robot, covariates, readings, settings);
-    if (regular) mission.add_regular(windows, position, keep_every);
-    if (readings.power_rows()) {
-      mission.add_power_rows(windows, position, keep_every);
-    } else if (readings.held()) {
-      mission.add_readings(windows);
-    }
+    mission.add_regular(windows, position, keep_every);
+    if (readings.held()) mission.add_readings(windows);
   }
   return windows;
 }

@@ -93,8 +93,6 @@ struct Readings {
   bool motor_voltages = false;
   bool battery_power = false;  // read anywhere
   bool held() const { return battery_held || motors_held; }
-  // Battery power is compared with the motion alone, in rows at its readings.
-  bool power_rows() const { return battery_power && !motor_currents; }
 };
 
 // How these recordings were read; a repetition that a window averages out is none.
@@ -104,9 +102,7 @@ Readings find_readings(std::span<const telemetry::Recording> missions);
 std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
 
 // Windows of all missions, half overlapping. Channels with held readings have windows of their own, one per
-// reading, after the others of their mission. Where battery power is compared with the motion alone, its
-// windows are rows of new readings that do not overlap, each of half a second or two readings. The motion at
-// a reading is a straight line through the wheel speeds about it; a row's parts are means over its readings.
+// reading, after the others of their mission.
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings = {});

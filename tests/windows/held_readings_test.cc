@@ -41,7 +41,6 @@ TEST(FindReadings, DetectsReadingsInEachRow) {
   EXPECT_NEAR(r.row_s, 0.02, 1e-9);
   EXPECT_NEAR(r.period_s, 0.02, 1e-9);
   EXPECT_TRUE(r.motor_currents && r.motor_voltages && r.battery_power);
-  EXPECT_FALSE(r.power_rows());
 }
 
 TEST(FindReadings, IgnoresShortRepetitions) {
@@ -54,16 +53,6 @@ TEST(FindReadings, FindsPeriodOfHeldBattery) {
   EXPECT_TRUE(r.battery_held);
   EXPECT_FALSE(r.motors_held);
   EXPECT_NEAR(r.period_s, 1, 1e-6);
-}
-
-TEST(FindReadings, PowerRowsReplaceMissingCurrents) {
-  auto mission = held(60, 20, 0.05);
-  for (std::size_t k = 0; k < mission.samples.size(); ++k)
-    if (k % 10 != 0) mission.samples[k].motor_current_a[1] = signals::unmeasured;
-  const Readings seldom = find_readings(std::vector{mission});
-  EXPECT_TRUE(seldom.power_rows() && seldom.motor_voltages);
-  for (Sample& s : mission.samples) s.battery_current_a = signals::unmeasured;
-  EXPECT_FALSE(find_readings(std::vector{mission}).power_rows());
 }
 
 TEST(FindReadings, OneHeldMissionIsIgnored) {
@@ -94,106 +83,6 @@ TEST(HeldWindows, UseEachReadingOnce) {
     EXPECT_TRUE(std::isnan(w.yaw_rate_rad_s));
   }
   EXPECT_NEAR(static_cast<double>(count), 299, 1);
-}
-
-TEST(PowerRows, SlowSamplesGiveAcceleration) {
-  // Samples of 1 Hz that come up to 5 ms early or late; a reading every 3 s, so two in a row.
-  const auto robot = testing::nomad();
-  std::mt19937_64 random(2);
-  std::uniform_int_distribution<int> jitter(-5000, 5000);
-  auto mission = testing::recorded(1200, 1, [](double t, Sample& s) {
-    s.wheel_velocity_rad_s = {5 + 0.02 * t, 5};
-    s.battery_voltage_v = 25;
-    s.battery_current_a = 2 + std::sin(0.05 * 3 * std::floor(t / 3 + 1e-6));
-  });
-  for (Sample& s : mission.samples) {
-    if (s.sequence > 0) s.utime_us += jitter(random);
-    s.wheel_velocity_rad_s[0] = 5 + 0.02e-6 * static_cast<double>(s.utime_us - testing::start_us);
-  }
-  const std::vector missions{mission};
-  const Readings readings = find_readings(missions);
-  ASSERT_TRUE(readings.battery_held);
-  EXPECT_NEAR(readings.period_s, 3, 0.01);
-  std::size_t count = 0;
-  for (const Window& w : make_windows(missions, robot, readings)) {
-    ++count;
-    EXPECT_TRUE(w.reading);
-    EXPECT_NEAR(w.acceleration_rad_s2[0], 0.02, 1e-9);
-    EXPECT_NEAR(w.speed_rad_s[0], 5 + 0.02 * w.t_s, 1e-3);
-  }
-  EXPECT_NEAR(static_cast<double>(count), 200, 4);
-}
-
-// Rows at 50 Hz in which only the battery and the wheels are read.
-Recording power_only(double seconds, double (*wheel)(double)) {
-  return testing::recorded(static_cast<std::size_t>(50 * seconds), 50, [&](double t, Sample& s) {
-    s.wheel_velocity_rad_s = {wheel(t), wheel(t)};
-    s.battery_voltage_v = 25;
-    s.battery_current_a = 2 + 0.1 * t;
-    s.yaw_rate_rad_s = 0.1;
-  });
-}
-
-TEST(PowerRows, LastHalfSecondWithoutOverlap) {
-  const std::vector missions{power_only(60, [](double t) { return 4 + std::sin(t); })};
-  const auto rows = make_windows(missions, testing::nomad(), find_readings(missions));
-  ASSERT_EQ(rows.size(), 120u);
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const Window& w = rows[k];
-    EXPECT_TRUE(w.reading && w.moving[0] && !w.resting[0]);
-    EXPECT_EQ(w.continues, k > 0);
-    EXPECT_EQ(w.length_s, 0.5);
-    // 25 samples from 0.5 k on, so their mean is 0.24 s later; power is a straight line.
-    EXPECT_NEAR(w.t_s, 0.5 * static_cast<double>(k) + 0.24, 1e-6);
-    EXPECT_NEAR(w.battery_power_w, 25 * (2 + 0.1 * w.t_s), 1e-6);
-    EXPECT_EQ(w.battery_power_slope_w_s, 0);
-    EXPECT_NEAR(w.yaw_rate_rad_s, 0.1, 1e-12);
-    double weight = 0, mean = 0, rate = 0;
-    for (std::size_t part = 0; part < 3; ++part) {
-      weight += w.part_weight[part];
-      mean += w.part_weight[part] * w.part_speed_rad_s[part][0];
-      rate += w.part_weight[part] * w.part_acceleration_rad_s2[part][0];
-    }
-    EXPECT_NEAR(weight, 1, 1e-12);
-    EXPECT_NEAR(mean, w.speed_rad_s[0], 1e-12);
-    EXPECT_NEAR(rate, w.acceleration_rad_s2[0], 1e-12);
-    // The slope over +-0.4 s of a sine is its derivative times 0.985.
-    if (k == 0 || k + 1 == rows.size()) continue;
-    EXPECT_NEAR(w.part_acceleration_rad_s2[1][0], 0.985 * std::cos(w.t_s), 0.02);
-  }
-}
-
-TEST(PowerRows, KeepStartsAndStops) {
-  // At rest for four seconds of eight, then at 5 rad/s at once: no reading is left out.
-  const std::vector missions{power_only(64, [](double t) { return std::fmod(t, 8) < 4 ? 0.0 : 5.0; })};
-  const auto rows = make_windows(missions, testing::nomad(), find_readings(missions));
-  ASSERT_EQ(rows.size(), 128u);
-  std::size_t resting = 0, moving = 0, between = 0;
-  double mean = 0;
-  for (const Window& w : rows) {
-    ++(w.resting[0] ? resting : w.moving[0] ? moving : between);
-    mean += w.speed_rad_s[0] / static_cast<double>(rows.size());
-    if (!w.resting[0]) continue;
-    EXPECT_EQ(w.speed_rad_s[0], 0);
-    EXPECT_EQ(w.acceleration_rad_s2[0], 0);
-  }
-  EXPECT_NEAR(mean, 2.5, 0.05);
-  EXPECT_GT(resting, 40u);
-  EXPECT_GT(moving, 40u);
-  EXPECT_GT(between, 10u);
-}
-
-TEST(PowerRows, MotorVoltagesKeepTheirOwnWindows) {
-  std::vector missions{power_only(60, [](double t) { return 4 + std::sin(t); })};
-  for (Sample& s : missions[0].samples) s.motor_voltage_v = {5, 5};
-  std::size_t rows = 0, regular = 0;
-  for (const Window& w : make_windows(missions, testing::nomad(), find_readings(missions))) {
-    ++(w.reading ? rows : regular);
-    EXPECT_EQ(std::isfinite(w.battery_power_w), w.reading);
-    EXPECT_EQ(std::isfinite(w.voltage_v[0]), !w.reading);
-  }
-  EXPECT_EQ(rows, 120u);
-  EXPECT_GT(regular, 250u);
 }
 
 TEST(HeldWindows, UseReadingsOfHeldMotors) {

@@ -325,7 +325,7 @@ class Diagnoser {
 
 // The gap of recordings before readings are moved.
 GapSize gap_as_read(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
-  const auto data = posterior::make_data(recordings.missions, robot);
+  const auto data = posterior::make_data(recordings.missions, robot, 0, true);
   return data && data->power ? gap_size(*data, posterior::predicted_power(*data, data->in_file))
                              : GapSize{missing, missing};
 }

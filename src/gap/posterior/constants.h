@@ -11,6 +11,8 @@ namespace joulecast::gap::posterior {
 inline constexpr double line_s = 0.4, line_rows = 2.2;    // half of the line about a reading [s], [rows]
 inline constexpr std::array line_lengths{1.0, 2.0, 4.0};  // of it, for the acceleration
 inline constexpr double row_s = 0.5, row_readings = 2;    // of battery power
+inline constexpr double knot_s = 0.25;                    // between the ends of pieces of a row
+inline constexpr double surely_better = 3;                // sd of a difference of squares
 inline constexpr std::size_t row_instants = 3;            // of a row at which the model is evaluated
 inline constexpr std::size_t most_power_rows = 10000, most_windows = 4000;
 inline constexpr std::size_t fewest_windows = 40, fewest_rows = 20;  // of recordings, of a channel

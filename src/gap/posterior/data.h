@@ -113,9 +113,10 @@ struct Data {
 };
 
 // Returns the rows of these missions; in windows, electrical readings are first moved back by
-// `electrical_delay_s`. Fault::invalid where too few rows have a measured motion.
+// `electrical_delay_s`; `as_read`: a delay of battery power behind the motion stays in the rows.
+// Fault::invalid where too few rows have a measured motion.
 Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
-                       double electrical_delay_s = 0);
+                       double electrical_delay_s = 0, bool as_read = false);
 
 // The same recordings with the rows of another witness; `factors`: posterior of the tolerance factors.
 Data rows_of_witness(const Data& data, Witness witness, const Eigen::VectorXd& factors);

@@ -308,6 +308,25 @@ TEST(SlowRows, MeansAreOfIntervals) {
   }
 }
 
+// A meter that answers late, and one that leads wheel speeds that are filtered.
+TEST(LatePower, FindsMotionOfReadings) {
+  const Drives drives(38);
+  for (const int late : {-3, 3}) {  // rows of 0.05 s
+    telemetry::RecordingSet recordings = drives.recordings();
+    for (telemetry::Recording& mission : recordings.missions) {
+      const std::vector<signals::Sample> sent = mission.samples;
+      const auto count = static_cast<int>(sent.size());
+      for (int k = 0; k < count; ++k)
+        mission.samples[static_cast<std::size_t>(k)].battery_current_a =
+            sent[static_cast<std::size_t>(std::clamp(k - late, 0, count - 1))].battery_current_a;
+    }
+    const auto data = make_data(recordings.missions, drives.robot);
+    ASSERT_TRUE(data && data->power);
+    const Eigen::VectorXd missed_w = predicted_power(*data, {}) - data->rows.measured_w();
+    EXPECT_LT(missed_w.cwiseAbs().mean(), 0.02 * data->mean_power_w) << late;
+  }
+}
+
 // Currents of the motors on a sloping floor, by a robot with these effects, and noise of the speeds. Every
 // other mission carries a payload, with a yaw inertia of `gyration_m2` a kilogram.
 telemetry::RecordingSet noisy_currents(const Drives& drives,
