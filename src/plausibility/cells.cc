@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "signals/gaps.h"
 
@@ -30,6 +31,11 @@ void CellCutter::take(signals::Sample s) {
   for (std::size_t k : {0u, 1u}) sums_.tw[k] += t * s.wheel_velocity_rad_s[k];
   s.payload_kg = payload_.take(s.payload_kg);
   const auto readings = signals::numbers_of(s);
+  for (std::size_t k = 0; k < motor_readings; ++k) {
+    auto& [a, b] = sums_.last[k];
+    if (sums_.rows() >= 2) sums_.alternating[k] = a - 2 * b + *readings[k] - sums_.alternating[k];
+    a = std::exchange(b, *readings[k]);
+  }
   for (std::size_t k = 0; k < reading_count; ++k) sums_.of[k].add(*readings[k]);
   sums_.battery_power.add(s.battery_voltage_v * s.battery_current_a);
   sums_.motor_power.add(s.motor_voltage_v[0] * s.motor_current_a[0] +
@@ -46,9 +52,15 @@ Cell CellCutter::cell() const {
   c.resting = true;
   const double n = sums_.rows(), spread = n * sums_.tt - sums_.t * sums_.t,
                rest = resting_part * limit_rad_s_;
+  // The rows count 1, 3, 4, ..., 4, 3 and 1 times, with alternating signs.
+  for (std::size_t k = 0; k < motor_readings; ++k)
+    c.noise[k] = sums_.alternating[k] / std::sqrt((16 * n - 44) * n);
   for (std::size_t k : {0u, 1u}) {
     const ValueTally& w = sums_.of[k];
-    if (spread > 0) c.acceleration_rad_s2[k] = n * (sums_.tw[k] - sums_.t * c.mean[k]) / spread;
+    if (spread > 0) {
+      c.acceleration_rad_s2[k] = n * (sums_.tw[k] - sums_.t * c.mean[k]) / spread;
+      c.acceleration_noise[k] = c.noise[k] * n / std::sqrt(spread);
+    }
     if (w.low() > moving_part * limit_rad_s_) c.way[k] = 1;
     if (w.high() < -moving_part * limit_rad_s_) c.way[k] = -1;
     c.resting = c.resting && std::fabs(c.mean[k]) < rest && std::max(w.high(), -w.low()) < 4 * rest;

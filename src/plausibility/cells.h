@@ -12,12 +12,18 @@
 
 namespace joulecast::plausibility {
 
+inline constexpr std::size_t motor_readings = reading::motor_current + 2;
+
 // Means over consecutive rows, over a time long enough for noise and small delays to cancel. NaN: not
 // measured. Sides [0] right, [1] left.
 struct Cell {
   double length_s = 0;
   std::array<double, reading_count> mean{};  // of each reading; payload 0 where not stated
   std::array<double, 2> acceleration_rad_s2{};
+  // Values of the size of the rows' white noise in the means of the speeds, motor voltages and motor currents
+  // (the first readings) and in the accelerations, without the motion.
+  std::array<double, motor_readings> noise{};
+  std::array<double, 2> acceleration_noise{};
   std::array<int, 2> way{};  // +1, -1: direction of the wheel throughout, else 0
   bool resting = false;      // both wheels at rest
   double battery_power_w = 0, motor_power_w = 0;
@@ -36,6 +42,9 @@ class CellCutter {
     double t = 0, tt = 0;
     std::array<double, 2> tw{};
     std::array<ValueTally, reading_count> of;
+    // The last two rows, and the sum of their second differences with alternating signs.
+    std::array<std::array<double, 2>, motor_readings> last{};
+    std::array<double, motor_readings> alternating{};
     ValueTally battery_power, motor_power;
     double rows() const { return static_cast<double>(of[reading::wheel_velocity].known()); }
   };

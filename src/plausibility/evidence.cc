@@ -47,15 +47,16 @@ double trust_of_sides(const std::array<Estimate, 2>& ratio, double else_trust) {
 constexpr double longest_delay_s = 0.1;  // cells are 0.4 s; their mean acceleration is too coarse beyond
 
 // Regresses V on i, w and sign of one motor, or on i and w of the differences of the sides: R, K and c. The
-// speed is taken at the instant of the electrical readings, w - delay a; an unknown delay (NaN) is estimated
-// with them.
+// speed is taken at the instant of the electrical readings, w - delay a, of which the delay is estimated with
+// them: acceleration resembles the current, so that a wrong delay changes R by its ratio to the drive's
+// mechanical time constant. Only a long delay is that of the currents' shape.
 BlockFit fit_armature(const CheckContext& c, Relation relation) {
   const bool difference = relation == Relation::armature_difference;
   const Eigen::Index acceleration = difference ? 3 : 4;
   std::vector<Eigen::Index> terms{1, 2};
   if (!difference) terms.push_back(3);
   std::vector<Products::Block> blocks = c.blocks(relation);
-  if (!std::isnan(c.motor_delay_s))
+  if (c.motor_delay_s > longest_delay_s)
     return fit_blocks(with_part_of(std::move(blocks), 2, acceleration, -c.motor_delay_s), 0, terms);
   terms.push_back(acceleration);
   const BlockFit fit = fit_blocks(blocks, 0, terms);

@@ -131,9 +131,10 @@ void Observer::take(Sample s) {
 }
 
 void Observer::relate(Relation relation, std::initializer_list<std::size_t> readings,
-                      std::initializer_list<double> row) {
+                      std::initializer_list<double> row,
+                      std::initializer_list<std::initializer_list<double>> noise) {
   const auto k = static_cast<std::size_t>(relation);
-  seen_.relations[k].add(row);
+  seen_.relations[k].add(row, noise);
   for (const std::size_t reading : readings) seen_.readings[k] |= 1u << reading;
 }
 
@@ -142,6 +143,7 @@ void Observer::take(const Cell& c) {
   using R = Relation;
   const dynamics::Parameters<double>& p = model_.parameters();
   const std::array<double, reading_count>& z = c.mean;
+  const std::array<double, motor_readings>& e = c.noise;
   const double common = 0.5 * (c.acceleration_rad_s2[0] + c.acceleration_rad_s2[1]);
   const double difference = 0.5 * (c.acceleration_rad_s2[0] - c.acceleration_rad_s2[1]);
   const bool turning = std::fabs(z[wr] - z[wl]) > turning_share * (std::fabs(z[wr]) + std::fabs(z[wl]));
@@ -150,7 +152,8 @@ void Observer::take(const Cell& c) {
     if (c.way[k] == 0) continue;
     const double w = z[wr + k], way = c.way[k], slip = !turning ? 0.0 : w > z[wl - k] ? 1.0 : -1.0;
     relate(of_side(R::armature_right, k), {wr + k, vr + k, ir + k},
-           {z[vr + k], z[ir + k], w, way, c.acceleration_rad_s2[k], 1.0});
+           {z[vr + k], z[ir + k], w, way, c.acceleration_rad_s2[k], 1.0},
+           {{e[vr + k], e[ir + k], e[wr + k], 0, 0, 0}, {0, 0, 0, 0, c.acceleration_noise[k], 0}});
     relate(of_side(R::torque_right, k), {wr + k, ir + k},
            {z[ir + k], way, w, common, k == 0 ? difference : -difference, slip, 1.0});
   }
@@ -158,7 +161,9 @@ void Observer::take(const Cell& c) {
     relate(R::siblings, {wr, wl, ir, il}, {c.way[0] * z[ir], c.way[0] * z[il], 1.0});
   if (moves)
     relate(R::armature_difference, {wr, wl, vr, vl, ir, il},
-           {z[vr] - z[vl], z[ir] - z[il], z[wr] - z[wl], 2 * difference});
+           {z[vr] - z[vl], z[ir] - z[il], z[wr] - z[wl], 2 * difference},
+           {{e[vr] - e[vl], e[ir] - e[il], e[wr] - e[wl], 0},
+            {0, 0, 0, c.acceleration_noise[0] - c.acceleration_noise[1]}});
   if (!c.resting) relate(R::gyro, {wr, wl, yaw_rate}, {z[yaw_rate], z[wr], z[wl], 1.0});
   const double right_m_s = p.wheel_radius_m[0] * z[wr], left_m_s = p.wheel_radius_m[1] * z[wl];
   const double speed = 0.5 * (right_m_s + left_m_s), turn = or_zero(z[command_turn]);

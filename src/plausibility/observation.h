@@ -105,7 +105,8 @@ class Observer {
   void take_power(const Cell& cell);
   void take(const Span& span);
   void relate(Relation relation, std::initializer_list<std::size_t> readings,
-              std::initializer_list<double> row);
+              std::initializer_list<double> row,
+              std::initializer_list<std::initializer_list<double>> noise = {});
 
   robot::RobotModel robot_;
   dynamics::DriveModel model_, larger_, smaller_;  // on wheels of double and of half the radius

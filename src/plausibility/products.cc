@@ -42,12 +42,19 @@ std::optional<Terms> solve(const Sums& sums, const Terms& zero) {
 void Products::Block::join(const Block& other) {
   rows += other.rows;
   sums += other.sums;
+  noise += other.noise;
 }
 
-void Products::add(std::initializer_list<double> row) {
-  const Eigen::Map<const Eigen::VectorXd> z(row.begin(), static_cast<Eigen::Index>(row.size()));
+void Products::add(std::initializer_list<double> row,
+                   std::initializer_list<std::initializer_list<double>> noise) {
+  using Values = Eigen::Map<const Eigen::VectorXd>;
+  const Values z(row.begin(), static_cast<Eigen::Index>(row.size()));
   if (!z.allFinite()) return;
-  if (open_.rows == 0) open_.sums = Eigen::MatrixXd::Zero(z.size(), z.size());
+  if (open_.rows == 0) open_.sums = open_.noise = Eigen::MatrixXd::Zero(z.size(), z.size());
+  for (const auto& part : noise) {
+    const Values e(part.begin(), z.size());
+    if (e.allFinite()) open_.noise.noalias() += e * e.transpose();
+  }
   open_.sums.noalias() += z * z.transpose();
   open_.rows += 1;
 }
@@ -70,7 +77,7 @@ std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, E
   for (Products::Block& block : blocks) {
     Eigen::MatrixXd change = Eigen::MatrixXd::Identity(block.sums.rows(), block.sums.rows());
     change(k, j) += factor;
-    block.sums = change * block.sums * change.transpose();
+    for (Eigen::MatrixXd* of : {&block.sums, &block.noise}) *of = change * *of * change.transpose();
   }
   return blocks;
 }
@@ -83,10 +90,11 @@ BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, con
   const auto n = static_cast<Eigen::Index>(x.size());
   Indices used = x;
   used.push_back(y);
-  std::vector<Sums> sums;
+  std::vector<Sums> sums, clean;
   Terms all = Terms::Zero(n);
   for (const Products::Block& block : blocks) {
     sums.emplace_back(block.sums(used, used));
+    clean.emplace_back(sums.back() - block.noise(used, used));
     all += sums.back().diagonal().head(n);
   }
   const Terms zero = all.unaryExpr([](double sum) { return sum > 0 ? 0.0 : 1.0; });
@@ -97,7 +105,7 @@ BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, con
   Sums total;
   for (int round = 1;; ++round) {
     total = Sums::Zero(n + 1, n + 1);
-    for (std::size_t k = 0; k < blocks.size(); ++k) total += weight[k] * sums[k];
+    for (std::size_t k = 0; k < blocks.size(); ++k) total += weight[k] * clean[k];
     const auto solved = solve(total, zero);
     if (!solved) return fit;
     fit.coefficient = *solved;
@@ -113,7 +121,7 @@ BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, con
   }
   fit.covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const auto without = solve(total - weight[k] * sums[k], zero);
+    const auto without = solve(total - weight[k] * clean[k], zero);
     if (!without) return fit;  // one block alone distinguishes the terms
     const Terms change = *without - fit.coefficient;
     fit.covariance += change * change.transpose();

@@ -17,12 +17,15 @@ class Products {
  public:
   struct Block {
     double rows = 0;
-    Eigen::MatrixXd sums;  // of the products of each two quantities
+    Eigen::MatrixXd sums;   // of the products of each two quantities
+    Eigen::MatrixXd noise;  // the part of the noise in them
     void join(const Block& other);
   };
 
-  // Adds a row; ignored unless all values are finite.
-  void add(std::initializer_list<double> row);
+  // Adds a row; ignored unless all values are finite. `noise`: independent parts of its noise, or values of
+  // their size.
+  void add(std::initializer_list<double> row,
+           std::initializer_list<std::initializer_list<double>> noise = {});
   // Starts a new block. If there are too many, neighbours are merged and blocks become twice as long.
   void next_block();
   // Ends the last block.
@@ -60,10 +63,11 @@ struct BlockFit {
   double sd(Eigen::Index k) const;
 };
 
-// Regresses quantity[y] on quantity[x...]. Blocks that fit far worse than the others are downweighted
-// (Huber). The covariance is the jackknife over blocks (Bell and McCaffrey 2002), which is not too small with
-// few blocks or dominant ones. A quantity that is 0 throughout leaves its own coefficient unknown. Collinear
-// quantities, also if only after removal of one block, or too few blocks leave all coefficients unknown.
+// Regresses quantity[y] on quantity[x...], without their noise (errors in variables). Blocks that fit far
+// worse than the others are downweighted (Huber). The covariance is the jackknife over blocks (Bell and
+// McCaffrey 2002), which is not too small with few blocks or dominant ones. A quantity that is 0 throughout
+// leaves its own coefficient unknown. Collinear quantities, also if only after removal of one block, or too
+// few blocks leave all coefficients unknown.
 BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y,
                     const std::vector<Eigen::Index>& x);
 

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "tests/plausibility/made_recordings.h"
 
@@ -34,6 +35,29 @@ TEST(Cells, ReturnsChannelMeansAndSlopes) {
     EXPECT_EQ(cell->mean[reading::payload], 5);
   }
   EXPECT_GE(count, 23u);
+}
+
+// Cells of 20 rows.
+TEST(Cells, SeparateNoiseFromMotion) {
+  for (const double noise : {0.0, 0.1}) {
+    std::mt19937_64 random(4);
+    std::normal_distribution<double> normal;
+    const auto recording = made::mission(400, 50, [&](double t, signals::Sample& s) {
+      s.wheel_velocity_rad_s[0] = 3 + 2 * std::sin(2 * t) + noise * normal(random);
+    });
+    CellCutter cutter(10, 0);
+    double mean = 0, slope = 0, count = 0;
+    for (const auto& s : recording.samples) {
+      const auto cell = cutter.add(s);
+      if (!cell) continue;
+      mean += cell->noise[0] * cell->noise[0];
+      slope += cell->acceleration_noise[0] * cell->acceleration_noise[0];
+      ++count;
+    }
+    const double rows = 20, step_s = 0.02;
+    EXPECT_NEAR(std::sqrt(mean / count), noise / std::sqrt(rows), 0.002);
+    EXPECT_NEAR(std::sqrt(slope / count), noise / step_s * std::sqrt(12 / (rows * (rows * rows - 1))), 0.02);
+  }
 }
 
 TEST(Cells, RejectsCellsAcrossGaps) {

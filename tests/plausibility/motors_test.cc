@@ -12,11 +12,13 @@ namespace joulecast::plausibility {
 namespace {
 
 struct Truth {
-  double resistance = 1.5, constant = 1.6, drop = 0.4, friction = 0.9, viscous = 0.03, inertia = 0.5;
+  double resistance = 1.5, constant = 1.6, drop = 0.4, friction = 0.9, viscous = 0.03, inertia = 0.5,
+         load = 0.3;
 };
 
 // A drive of two motors that obey the motor equations, with additional loads independent of motion.
-telemetry::RecordingSet motor_drive(const Truth& right, const Truth& left, double delay_s = 0) {
+telemetry::RecordingSet motor_drive(const Truth& right, const Truth& left, double delay_s = 0,
+                                    double noise = 0.02) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   std::vector<telemetry::Recording> missions;
@@ -29,11 +31,12 @@ telemetry::RecordingSet motor_drive(const Truth& right, const Truth& left, doubl
       for (std::size_t k : {0u, 1u}) {
         const Truth& motor = k == 0 ? right : left;
         const double w = then.speed[k], way = w > 0 ? 1 : w < 0 ? -1 : 0;
-        const double load = 0.3 * std::sin(0.9 * at) + 0.02 * normal(random);
-        s.motor_current_a[k] =
+        const double load = motor.load * std::sin(0.9 * at) + 0.02 * normal(random);
+        const double current =
             motor.friction * way + motor.viscous * w + motor.inertia * then.slope[k] + load;
-        s.motor_voltage_v[k] = motor.resistance * s.motor_current_a[k] + motor.constant * w +
-                               motor.drop * way + 0.02 * normal(random);
+        s.motor_current_a[k] = current + noise * normal(random);
+        s.motor_voltage_v[k] =
+            motor.resistance * current + motor.constant * w + motor.drop * way + noise * normal(random);
       }
     }));
     missions.back().mission_id = "m" + std::to_string(m);
@@ -81,6 +84,22 @@ TEST(MotorConstants, KeepsConstantsUnderDelay) {
   const auto m = motor_constants(motor_drive({}, {}, 0.15));
   EXPECT_NEAR(m[0].resistance_ohm.value, 1.5, 0.1);
   EXPECT_NEAR(m[0].constant_v_s_rad.value, 1.6, 0.02);
+}
+
+// A light robot: 10 ms are a fifth of its mechanical time constant.
+TEST(MotorConstants, KeepsResistanceUnderShortDelay) {
+  for (const double resistance : {1.2, 1.5, 1.95}) {
+    for (const double delay_s : {-0.02, -0.01, 0.0, 0.01, 0.02}) {
+      for (const double noise : {0.02, 0.06}) {
+        const Truth truth{.resistance = resistance, .inertia = 0.05, .load = 0.1};
+        for (const MotorConstants& m : motor_constants(motor_drive(truth, truth, delay_s, noise))) {
+          const Estimate& found = m.resistance_ohm;
+          EXPECT_NEAR(found.value, resistance, std::max(0.05 * resistance, 3 * found.sd)) << delay_s << noise;
+          EXPECT_LT(found.sd, 0.1) << delay_s << noise;
+        }
+      }
+    }
+  }
 }
 
 TEST(MotorChecks, AcceptsSimilarMotors) {

@@ -103,14 +103,21 @@ TEST(Products, BoundsMemoryAndKeepsSums) {
   EXPECT_EQ(sum, 200'000);
 }
 
-TEST(Products, ShiftsCoefficientWithQuantity) {
+TEST(Products, RemovesNoiseOfQuantities) {
   std::mt19937_64 random(10);
-  // y = 2 a - 3 b = 2 (a + 5 b) - 13 b
-  const Products products = relation(random, 30, 0.1);
-  const auto shifted = with_part_of(products.blocks(), 1, 2, 5);
-  const BlockFit fit = fit_blocks(shifted, 0, both);
-  EXPECT_NEAR(fit.coefficient[0], 2, 0.05);
-  EXPECT_NEAR(fit.coefficient[1], -13, 0.3);
+  std::normal_distribution<double> normal;
+  Products noisy, corrected;
+  for (int k = 0; k < 3000; ++k) {  // y = 2 a - 3 b, where b resembles a, read with noise
+    const double a = normal(random), b = a + 0.3 * normal(random), y = 2 * a - 3 * b,
+                 read = a + 0.1 * normal(random);
+    noisy.add({y, read, b});
+    corrected.add({y, read, b}, {{0, 0.1 * normal(random), 0}});
+    if (k % 10 == 9) noisy.next_block(), corrected.next_block();
+  }
+  EXPECT_LT(fit_blocks(noisy.blocks(), 0, both).coefficient[0], 1.9);
+  const Estimate a = estimate(fit_blocks(corrected.blocks(), 0, both), 0);
+  EXPECT_NEAR(a.value, 2, 0.05);
+  EXPECT_LT(std::fabs(a.value - 2), 3 * a.sd);
 }
 
 TEST(Products, ReturnsRatioOfMeans) {
