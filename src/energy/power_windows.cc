@@ -50,41 +50,59 @@ double turning_arm(const robot::RobotModel& robot) {
   return robot.kinematics.wheel_radius_m / (2 * robot.kinematics.half_track_m);
 }
 
-// Windows of three intervals between rows, about the same instants. Speeds change linearly from row to row,
-// and a row's power is the mean of a period that begins `phase` of a period before the row: 1 stands for a
-// mean since the last row, 0.5 for one about the row or for its instant.
+// Windows of one interval between rows, about the same instants. Where its mean acceleration is between those
+// of the neighbouring intervals, the first of them lasts until the second begins; else the speed changes
+// linearly: without the corner, the losses by the square of a current or speed would be too small. A row's
+// power is the mean of a period that begins `phase` of a period before the row: 1 stands for a mean since the
+// last row, 0.5 for one about the row or for its instant.
 std::vector<windows::Window> between_rows(std::span<const telemetry::Recording> missions,
                                           std::vector<windows::Window> windows, double phase) {
-  constexpr std::size_t intervals = std::tuple_size_v<decltype(windows::Window::part_weight)>;
-  std::erase_if(windows, [&](windows::Window& w) {
+  std::vector<windows::Window> between;
+  const auto add = [&](windows::Window w, std::size_t skipped) {
     const std::vector<signals::Sample>& rows = missions[w.mission].samples;
     const auto time_s = [&](const signals::Sample& s) {
       return 1e-6 * static_cast<double>(s.utime_us - rows.front().utime_us);
     };
-    const auto begin = std::ranges::lower_bound(
-        rows, w.t_s - intervals * w.length_s / (2 * rows_a_window) - 1e-3, {}, time_s);
-    const auto first = static_cast<std::size_t>(begin - rows.begin());
-    if (first + intervals >= rows.size()) return true;
-    const double whole_s = time_s(rows[first + intervals]) - time_s(rows[first]);
+    const auto begin =
+        std::ranges::lower_bound(rows, w.t_s - 3 * w.length_s / (2 * rows_a_window) - 1e-3, {}, time_s);
+    const auto first = static_cast<std::size_t>(begin - rows.begin()) + skipped;
+    if (first + 3 >= rows.size()) return;
+    const std::span<const signals::Sample, 4> near(&rows[first], 4);
+    if (time_s(near[3]) - time_s(near[0]) > w.length_s) return;
+    const double step_s = time_s(near[2]) - time_s(near[1]);
     w.reading = true;
-    w.battery_power_w = 0;
-    w.speed_rad_s = w.acceleration_rad_s2 = {};
-    for (std::size_t part = 0; part < intervals; ++part) {
-      const signals::Sample &before = rows[first + part], &after = rows[first + part + 1];
-      const double step_s = time_s(after) - time_s(before), share = step_s / whole_s;
-      w.part_weight[part] = share;
-      w.battery_power_w += share * (phase * power_w(after) + (1 - phase) * power_w(before));
+    w.battery_power_w = phase * power_w(near[2]) + (1 - phase) * power_w(near[1]);
+    std::array<double, 2> corner{1, 1}, corner_rad_s{};  // its share of the interval, and the speed at it
+    for (const std::size_t side : {0u, 1u}) {
+      const auto speed = [&](std::size_t k) { return near[k].wheel_velocity_rad_s[side]; };
+      const auto slope = [&](std::size_t k) {
+        return (speed(k + 1) - speed(k)) / (time_s(near[k + 1]) - time_s(near[k]));
+      };
+      const double share = (slope(1) - slope(2)) / (slope(0) - slope(2));
+      if (share > 0 && share < 1) corner[side] = share;
+      corner_rad_s[side] = corner[side] < 1 ? speed(1) + share * step_s * slope(0) : speed(2);
+      w.acceleration_rad_s2[side] = slope(1);
+      w.speed_rad_s[side] = 0;
+    }
+    const auto speed_at = [&](std::size_t side, double share) {
+      const double from = near[1].wheel_velocity_rad_s[side], to = near[2].wheel_velocity_rad_s[side];
+      return share <= corner[side]
+                 ? std::lerp(from, corner_rad_s[side], share / corner[side])
+                 : std::lerp(corner_rad_s[side], to, (share - corner[side]) / (1 - corner[side]));
+    };
+    const std::array<double, 4> end{0, std::min(corner[0], corner[1]), std::max(corner[0], corner[1]), 1};
+    for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
+      const double share = w.part_weight[part] = end[part + 1] - end[part];
       for (const std::size_t side : {0u, 1u}) {
-        const double from = before.wheel_velocity_rad_s[side], to = after.wheel_velocity_rad_s[side];
+        const double from = speed_at(side, end[part]), to = speed_at(side, end[part + 1]);
         w.part_speed_rad_s[part][side] = (from + to) / 2;
-        w.part_acceleration_rad_s2[part][side] = (to - from) / step_s;
+        w.part_acceleration_rad_s2[part][side] = share > 0 ? (to - from) / (share * step_s) : 0;
         w.speed_rad_s[side] += share * (from + to) / 2;
-        w.acceleration_rad_s2[side] += (to - from) / whole_s;
       }
     }
     for (const std::size_t side : {0u, 1u}) {
       double least = std::numeric_limits<double>::infinity(), most = -least;
-      for (const signals::Sample& s : std::span(rows).subspan(first, intervals + 1)) {
+      for (const signals::Sample& s : near.subspan<1, 2>()) {
         least = std::min(least, s.wheel_velocity_rad_s[side]);
         most = std::max(most, s.wheel_velocity_rad_s[side]);
       }
@@ -93,9 +111,11 @@ std::vector<windows::Window> between_rows(std::span<const telemetry::Recording> 
       w.resting[side] = std::max(most, -least) < windows::moving_rad_s &&
                         std::fabs(w.speed_rad_s[side]) < windows::resting_rad_s;
     }
-    return !std::isfinite(w.battery_power_w);
-  });
-  return windows;
+    if (std::isfinite(w.battery_power_w)) between.push_back(std::move(w));
+  };
+  for (const windows::Window& w : windows)  // they are two rows apart
+    for (const std::size_t skipped : {0u, 1u}) add(w, skipped);
+  return between;
 }
 
 }  // namespace

@@ -136,6 +136,46 @@ TEST(CalibrateFromPower, EstimatesEffectsAsInItsFile) {
 
 // Straight on at one speed: terms with and without the speed cannot be separated, and the robot neither turns
 // nor accelerates.
+// A robot that follows ramps of speed with corners at any time, straight on, and a meter of the mean power
+// since the last row. The reference is the integral of the motors' equations over steps of a millisecond.
+TEST(PowerWindows, KeepLossesOfRampsBetweenRows) {
+  const robot::RobotModel file = robot::parse_robot(R"({"robot_id": "ramps", "idle_power_w": 20,
+    "kinematics": {"wheel_radius_m": 0.1, "half_track_m": 0.2, "com_offset_m": 0},
+    "mass": {"chassis_kg": 60, "wheel_kg": 2, "yaw_inertia_kg_m2": 4, "wheel_inertia_kg_m2": 0.01},
+    "motor": {"resistance_ohm": 1.0, "inductance_h": 0, "torque_constant_nm_a": 1, "voltage_constant_v_s_rad": 1,
+      "gear_ratio": 1, "viscous_friction_nm_s_rad": 0.05, "friction_torque_nm": [1, 1]},
+    "battery": {"nominal_voltage_v": 24, "capacity_ah": 20, "internal_resistance_ohm": 0.02,
+      "reserve_fraction": 0.1},
+    "limits": {"speed_m_s": 2, "acceleration_m_s2": 1, "yaw_rate_rad_s": 2, "current_a": 40,
+      "payload_kg": 20}})")
+                                     .value();
+  telemetry::Recording mission{"ramps", "m", 0, {}};
+  double speed_rad_s = 20, energy_j = 0;
+  int steps = 0;
+  virtual_robot::Rng rng = virtual_robot::Rng::stream(5, 1);
+  for (int row = 0; row < 600;) {
+    const double slope_rad_s2 = rng.uniform(0.5, 3) * (speed_rad_s > 20 ? -1 : 1);
+    for (double left_s = rng.uniform(3.1, 5); left_s > 0; left_s -= 1e-3) {
+      speed_rad_s += 5e-4 * slope_rad_s2;
+      const double torque_nm = 1 + 0.05 * speed_rad_s + (64 * 0.01 / 2 + 0.01) * slope_rad_s2;
+      energy_j += 1e-3 * (20 + 2 * torque_nm * (torque_nm + speed_rad_s));
+      speed_rad_s += 5e-4 * slope_rad_s2;
+      if (++steps % 1000 != 0) continue;
+      signals::Sample& s = mission.samples.emplace_back();
+      s.utime_us = 1'750'000'000'000'000 + 1'000'000LL * ++row;
+      s.wheel_velocity_rad_s = {speed_rad_s, speed_rad_s};
+      s.battery_voltage_v = 24, s.battery_current_a = energy_j / 24;
+      energy_j = 0;
+    }
+  }
+  const auto data = power_windows({&mission, 1}, file, 1.0);
+  ASSERT_TRUE(data) << describe(data.error());
+  const dynamics::DriveModel model(file, {});
+  ASSERT_GT(data->windows.size(), 500u);
+  for (const windows::Window& w : data->windows)
+    EXPECT_NEAR(metered_power_w(model, w), w.battery_power_w, 0.1) << w.t_s;
+}
+
 TEST(CalibrateFromPower, ReportsUnidentifiableParameters) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
