@@ -455,18 +455,15 @@ void AttentionList::look() {
 }
 
 Part attention_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/attention", "listAttention", Role::read,
+  Part part{.schemas = {{"acknowledge-request", acknowledge_input.schema()}}};
+  part.add(Method::get, "/v1/attention", "listAttention", Role::read,
            "Robots that need attention now, the most urgent first, each with its reasons and what to do",
-           "attention", get_attention);
-  rows.add(Method::post, "/v1/robots/{id}/acknowledge", "acknowledgeAttention", Role::operate,
+           {"attention", attention_table.schema()}, get_attention);
+  part.add(Method::post, "/v1/robots/{id}/acknowledge", "acknowledgeAttention", Role::operate,
            "Acknowledges a robot's reasons of one kind, with a note, until their condition ends",
-           "attention-entry", acknowledge,
-           {.request_schema = "acknowledge-request", .error_statuses = {404, 422}, .run = Run::write});
-  return {std::move(rows),
-          {{"acknowledge-request", acknowledge_input.schema()},
-           {"attention", attention_table.schema()},
-           {"attention-entry", attention_entry_table.schema()}}};
+           {"attention-entry", attention_entry_table.schema()}, acknowledge,
+           {.request_schema = "acknowledge-request", .error_statuses = {404}, .run = Run::write});
+  return part;
 }
 
 }  // namespace joulecast::api

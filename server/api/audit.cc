@@ -31,15 +31,14 @@ Result<Response> audit(const Services& services, const Request& request) {
 }  // namespace
 
 Part audit_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/audit", "listAudit", Role::admin,
+  Part part;
+  part.add(Method::get, "/v1/audit", "listAudit", Role::admin,
            "Changes, rejected requests and sign-ins with their tokens; joulecast audit verify checks the "
            "chain of hashes",
-           "audit", audit,
-           {.parameters = log_parameters("only entries of this action", usual_request_order)});
-  return {std::move(rows),
-          {{"audit", described::of_page("Entries of the audit", "entries", "in the requested order",
-                                        entry_table.of_member())}}};
+           {"audit", described::of_page("Entries of the audit", "entries", "in the requested order",
+                                        entry_table.of_member())},
+           audit, {.parameters = log_parameters("only entries of this action", usual_request_order)});
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -103,12 +103,12 @@ Result<Response> cluster(const Services& services, const Request&) {
 }  // namespace
 
 Part cluster_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/cluster", "getCluster", Role::read,
+  Part part;
+  part.add(Method::get, "/v1/cluster", "getCluster", Role::read,
            "The daemons that share the fleet, and which of them keeps which robot; name is null where "
            "cluster.name is not set",
-           "cluster", cluster);
-  return {std::move(rows), {{"cluster", cluster_table.schema()}}};
+           {"cluster", cluster_table.schema()}, cluster);
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -206,43 +206,42 @@ Result<Response> events(const Services& services, const Request& request) {
 }  // namespace
 
 Part diagnosis_part() {
-  Rows rows;
-  rows.add(Method::post, "/v1/diagnoses", "startDiagnosis", Role::operate,
+  Part part{.schemas = {{"diagnosis-progress", progress_table.schema()},
+                        {"listed-diagnosis", listed_diagnosis_table.schema()}}};
+  part.add(Method::post, "/v1/diagnoses", "startDiagnosis", Role::operate,
            "Starts a diagnosis of the gap between a robot and its model over its stored missions, some of "
            "which are held back for a back-test",
-           "diagnosis", start,
+           {"diagnosis", diagnosis_table.schema()}, start,
            {.request_schema = "diagnosis-request",
             .success_status = 202,
-            .error_statuses = {404, 409, 422},
+            .error_statuses = {404, 409},
             .run = Run::write});
-  rows.add(Method::get, "/v1/diagnoses", "listDiagnoses", Role::read,
-           "Diagnoses, newest first, without their whole results", "diagnosis-list", list_diagnoses,
+  part.add(Method::get, "/v1/diagnoses", "listDiagnoses", Role::read,
+           "Diagnoses, newest first, without their whole results",
+           {"diagnosis-list",
+            described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",
+                               listed_diagnosis_table.of_member())},
+           list_diagnoses,
            {.parameters = {{.name = "robot_id", .description = "only of this robot"},
                            limit_parameter("diagnoses a page", 50, history::max_page_size),
                            cursor_parameter()},
             .csv = true,
             .rounded = true});
-  rows.add(Method::get, "/v1/diagnoses/{id}", "getDiagnosis", Role::read, "State and result of a diagnosis",
-           "diagnosis", get_diagnosis, {.etag = true, .error_statuses = {404}});
-  rows.add(Method::del, "/v1/diagnoses/{id}", "cancelDiagnosis", Role::operate,
-           "Cancels a waiting or running diagnosis", "diagnosis", cancel,
+  part.add(Method::get, "/v1/diagnoses/{id}", "getDiagnosis", Role::read, "State and result of a diagnosis",
+           {"diagnosis"}, get_diagnosis, {.etag = true, .error_statuses = {404}});
+  part.add(Method::del, "/v1/diagnoses/{id}", "cancelDiagnosis", Role::operate,
+           "Cancels a waiting or running diagnosis", {"diagnosis"}, cancel,
            {.error_statuses = {404, 409}, .run = Run::write});
-  rows.add(Method::get, "/v1/diagnoses/{id}/events", "streamDiagnosis", Role::read,
-           "The progress of a diagnosis as server-sent events, until it has ended", "", events,
+  part.add(Method::get, "/v1/diagnoses/{id}/events", "streamDiagnosis", Role::read,
+           "The progress of a diagnosis as server-sent events, until it has ended", {}, events,
            {.response_type = "text/event-stream",
             .events = {{"progress", "diagnosis-progress", "while it waits or runs, at every step"},
                        {"ended", "listed-diagnosis", "last of the stream"}},
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/diagnoses/{id}/report", "getDiagnosisReport", Role::read,
-           "The report of a diagnosis as one self-contained page", "", report,
+  part.add(Method::get, "/v1/diagnoses/{id}/report", "getDiagnosisReport", Role::read,
+           "The report of a diagnosis as one self-contained page", {}, report,
            {.response_type = "text/html", .error_statuses = {404}, .run = Run::compute});
-  return {std::move(rows),
-          {{"diagnosis", diagnosis_table.schema()},
-           {"diagnosis-progress", progress_table.schema()},
-           {"listed-diagnosis", listed_diagnosis_table.schema()},
-           {"diagnosis-list",
-            described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",
-                               listed_diagnosis_table.of_member())}}};
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -127,32 +127,32 @@ Result<Response> list_events(const Services& services, const Request& request) {
 }  // namespace
 
 Part gap_history_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/robots/{id}/gap-history", "getGapHistory", Role::read,
+  Part part;
+  part.add(Method::get, "/v1/robots/{id}/gap-history", "getGapHistory", Role::read,
            "Measured over modelled energy of a robot's missions with marks where it drifted, the models "
            "adopted, and the robots of its kind",
-           "gap-history", gap_history,
+           {"gap-history", gap_history_table.schema()}, gap_history,
            {.parameters = {limit_parameter("missions, newest first", 500, max_gap_missions)},
             .csv = true,
             .rounded = true,
             .error_statuses = {404}});
-  return {std::move(rows), {{"gap-history", gap_history_table.schema()}}};
+  return part;
 }
 
 Part event_log_part() {
-  Rows rows;
-  rows.add(
+  Part part;
+  part.add(
       Method::get, "/v1/event-log", "listEventLog", Role::read,
       "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
-      "event-log", list_events,
+      {"event-log", described::of_page("Entries of the event log", "events", "in the requested order",
+                                       event_table.of_member())},
+      list_events,
       {.former_path = "/v1/audit-log",
        .parameters = with({{.name = "robot_id",
                             .description = "only entries of this robot, or of these, separated by commas"}},
                           log_parameters("only entries of this kind", usual_event_order)),
        .csv = true});
-  return {std::move(rows),
-          {{"event-log", described::of_page("Entries of the event log", "events", "in the requested order",
-                                            event_table.of_member())}}};
+  return part;
 }
 
 }  // namespace joulecast::api

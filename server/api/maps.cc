@@ -322,16 +322,17 @@ Result<Response> floor_map(const Services& services, const Request& request) {
 Part map_part() {
   constexpr const char* path = "/v1/maps/{map}/levels/{level}";
   constexpr auto number = Parameter::Type::number;
-  Rows rows;
-  rows.add(Method::get, "/v1/maps", "listMaps", Role::read,
-           "Floor plans, and the map and level on which each robot drives", "maps", list_maps);
-  rows.add(Method::get, path, "getFloorPlan", Role::read, "The image of a floor plan", "", get_plan,
+  Part part;
+  part.add(Method::get, "/v1/maps", "listMaps", Role::read,
+           "Floor plans, and the map and level on which each robot drives", {"maps", maps_table.schema()},
+           list_maps);
+  part.add(Method::get, path, "getFloorPlan", Role::read, "The image of a floor plan", {}, get_plan,
            {.response_type = "image/*", .etag = true, .error_statuses = {404}});
-  rows.add(
+  part.add(
       Method::put, path, "putFloorPlan", Role::admin,
       "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its scale and origin as in "
       "a map.yaml of ROS",
-      "floor-plan", put_plan,
+      {"floor-plan", plan_table.schema()}, put_plan,
       {.parameters =
            {{.name = "resolution_m",
              .type = number,
@@ -345,28 +346,25 @@ Part map_part() {
             {.name = "chargers", .description = "places of chargers in the map, m, as x,y;x,y"}},
        .request_types = {"image/png", "image/svg+xml"},
        .max_body_bytes = most_plan_bytes,
-       .error_statuses = {413, 422},
+       .error_statuses = {413},
        .run = Run::write});
-  rows.add(Method::del, path, "removeFloorPlan", Role::admin, "Deletes the floor plan of a level",
-           "robot-place", remove_plan, {.error_statuses = {404, 422}, .run = Run::write});
-  rows.add(
+  part.add(Method::del, path, "removeFloorPlan", Role::admin, "Deletes the floor plan of a level",
+           {"robot-place"}, remove_plan, {.error_statuses = {404, 422}, .run = Run::write});
+  part.add(
       Method::put, "/v1/robots/{id}/place", "putRobotPlace", Role::operate,
       "Sets the map and level on which a robot drives; its covariates map=NAME and level=NAME override them",
-      "robot-place", put_place,
-      {.request_schema = "robot-place", .error_statuses = {404, 422}, .run = Run::write});
-  return {std::move(rows),
-          {{"floor-plan", plan_table.schema()},
-           {"maps", maps_table.schema()},
-           {"robot-place", place_table.schema()}}};
+      {"robot-place", place_table.schema()}, put_place,
+      {.request_schema = "robot-place", .error_statuses = {404}, .run = Run::write});
+  return part;
 }
 
 Part floor_map_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/floor-map", "mapFloor", Role::read,
+  Part part;
+  part.add(Method::get, "/v1/floor-map", "mapFloor", Role::read,
            "Energy and gap by floor square, from the traces of missions, with zones of significant "
            "departure; of a history of more than a million seconds an evenly distributed sample of the "
            "missions is evaluated",
-           "floor-map", floor_map,
+           {"floor-map", floor_map_table.schema()}, floor_map,
            {.parameters = with(
                 range_parameters("missions that started"),
                 {{.name = "robot_id",
@@ -376,7 +374,7 @@ Part floor_map_part() {
                  limit_parameter("squares, the longest visited first", usual_cells, most_cells)}),
             .csv = true,
             .rounded = true});
-  return {std::move(rows), {{"floor-map", floor_map_table.schema()}}};
+  return part;
 }
 
 }  // namespace joulecast::api

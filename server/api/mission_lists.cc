@@ -225,18 +225,22 @@ Result<Response> tariff(const Services& services, const Request&) {
 }  // namespace
 
 Part mission_list_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/missions", "listMissions", Role::read,
-           "Missions, newest first or sorted, in pages that stay stable while missions come", "mission-page",
-           list_missions,
-           {.parameters =
-                with(with(filter_parameters(), sort_parameters()),
-                     {limit_parameter("missions a page", 50, history::max_page_size), cursor_parameter()}),
-            .csv = true,
-            .rounded = true});
-  rows.add(
+  Part part;
+  part.add(
+      Method::get, "/v1/missions", "listMissions", Role::read,
+      "Missions, newest first or sorted, in pages that stay stable while missions come",
+      {"mission-page", described::of_page("A page of missions", "missions", "missions in the requested order",
+                                          answers::mission_table().of_member())},
+      list_missions,
+      {.parameters =
+           with(with(filter_parameters(), sort_parameters()),
+                {limit_parameter("missions a page", 50, history::max_page_size), cursor_parameter()}),
+       .csv = true,
+       .rounded = true});
+  part.add(
       Method::get, "/v1/mission-totals", "totalMissions", Role::read,
-      "Sums of energy and ledger over the selected missions, optionally by group", "mission-totals", totals,
+      "Sums of energy and ledger over the selected missions, optionally by group",
+      {"mission-totals", totals_answer_table.schema()}, totals,
       {.parameters = with(
            filter_parameters(),
            {{.name = "group_by",
@@ -249,10 +253,10 @@ Part mission_list_part() {
                     -1440, 1440)}),
        .csv = true,
        .rounded = true});
-  rows.add(Method::get, "/v1/tariff", "getTariff", Role::read,
-           "Price and emissions of a kilowatt hour, by which the page values energy", "tariff", tariff);
-  return {std::move(rows),
-          {{"tariff", tariff_table.schema()}, {"mission-totals", totals_answer_table.schema()}}};
+  part.add(Method::get, "/v1/tariff", "getTariff", Role::read,
+           "Price and emissions of a kilowatt hour, by which the page values energy",
+           {"tariff", tariff_table.schema()}, tariff);
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -464,38 +464,36 @@ Result<Response> request_mission(Services& services, const Request& request) {
 Part mission_part() {
   using Type = Parameter::Type;
   const std::vector<Parameter> span = range_parameters("data");
-  Rows rows;
-  rows.push_back({{.method = Method::get,
-                   .path = "/v1/missions/{id}",
-                   .operation_id = "getMission",
-                   .role = Role::read,
-                   .summary = "One mission: its energy, measured and modelled",
-                   .response_schema = "mission",
-                   .rounded = true,
-                   .etag = true,
-                   .error_statuses = {404}},
-                  [](Services& services, http::Endpoint& endpoint) {
-                    const auto summaries = std::make_shared<MissionSummaries>(services);
-                    endpoint.brief = [summaries](const Request& request) { return summaries->find(request); };
-                    endpoint.handler = [summaries](const Request& request) {
-                      return summaries->read(request);
-                    };
-                  }});
-  rows.add(Method::post, "/v1/missions/{id}/annul", "annulMission", Role::operate,
-           "Excludes an ended mission from all sums and from training, with a reason that lists and the "
-           "event log contain",
-           "mission", annul,
-           {.request_schema = "annul-request",
-            .rounded = true,
-            .error_statuses = {404, 409, 422},
-            .run = Run::write});
-  rows.add(Method::get, "/v1/missions/{id}/ledger", "getMissionLedger", Role::read,
-           "Energy of a mission by term; the sum of the terms is the battery's energy", "mission-ledger",
-           ledger, {.csv = true, .rounded = true, .etag = true, .error_statuses = {404}});
-  rows.add(
+  Part part{.schemas = {{"annul-request", annulment_input.schema()}}};
+  part.rows.push_back(
+      {{.method = Method::get,
+        .path = "/v1/missions/{id}",
+        .operation_id = "getMission",
+        .role = Role::read,
+        .summary = "One mission: its energy, measured and modelled",
+        .response_schema = "mission",
+        .rounded = true,
+        .etag = true,
+        .error_statuses = {404}},
+       [](Services& services, http::Endpoint& endpoint) {
+         const auto summaries = std::make_shared<MissionSummaries>(services);
+         endpoint.brief = [summaries](const Request& request) { return summaries->find(request); };
+         endpoint.handler = [summaries](const Request& request) { return summaries->read(request); };
+       }});
+  part.add(
+      Method::post, "/v1/missions/{id}/annul", "annulMission", Role::operate,
+      "Excludes an ended mission from all sums and from training, with a reason that lists and the "
+      "event log contain",
+      {"mission", answers::mission_table().schema()}, annul,
+      {.request_schema = "annul-request", .rounded = true, .error_statuses = {404, 409}, .run = Run::write});
+  part.add(Method::get, "/v1/missions/{id}/ledger", "getMissionLedger", Role::read,
+           "Energy of a mission by term; the sum of the terms is the battery's energy",
+           {"mission-ledger", mission_ledger_table.schema()}, ledger,
+           {.csv = true, .rounded = true, .etag = true, .error_statuses = {404}});
+  part.add(
       Method::get, "/v1/missions/{id}/trace", "getMissionTrace", Role::read,
       "Power, speed, charge and position over a mission, as minimum, mean and maximum of equal intervals",
-      "mission-trace", trace,
+      {"mission-trace", trace_table.schema()}, trace,
       {.parameters = with(span, {{.name = "points",
                                   .type = Type::integer,
                                   .description = "largest number of intervals",
@@ -506,44 +504,35 @@ Part mission_part() {
        .rounded = true,
        .etag = true,
        .error_statuses = {404}});
-  rows.add(Method::get, "/v1/missions/{id}/telemetry", "getMissionTelemetry", Role::read,
-           "The samples of a mission as received, within the retention", "mission-telemetry", raw_telemetry,
+  part.add(Method::get, "/v1/missions/{id}/telemetry", "getMissionTelemetry", Role::read,
+           "The samples of a mission as received, within the retention",
+           {"mission-telemetry", telemetry_table.schema()}, raw_telemetry,
            {.parameters = with(span, {limit_parameter("samples a page", 1000, history::max_telemetry_samples),
                                       cursor_parameter()}),
             .csv = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/missions/{id}/covariates", "getMissionCovariates", Role::read,
-           "Changes of a mission's covariates, within the retention", "mission-covariates", covariates,
+  part.add(Method::get, "/v1/missions/{id}/covariates", "getMissionCovariates", Role::read,
+           "Changes of a mission's covariates, within the retention",
+           {"mission-covariates", covariates_table.schema()}, covariates,
            {.parameters = with(span, {limit_parameter("changes a page", 1000, history::max_telemetry_samples),
                                       cursor_parameter()}),
             .csv = true,
             .etag = true,
             .error_statuses = {404}});
-  return {std::move(rows),
-          {{"annul-request", annulment_input.schema()},
-           {"mission", answers::mission_table().schema()},
-           {"mission-ledger", mission_ledger_table.schema()},
-           {"mission-page",
-            described::of_page("A page of missions", "missions", "missions in the requested order",
-                               answers::mission_table().of_member())},
-           {"mission-covariates", covariates_table.schema()},
-           {"mission-telemetry", telemetry_table.schema()},
-           {"mission-trace", trace_table.schema()}}};
+  return part;
 }
 
 Part mission_request_part() {
-  Rows rows;
-  rows.add(Method::post, "/v1/robots/{id}/missions", "requestMission", Role::operate,
+  Part part{.schemas = {{"mission-request", mission_event_input.schema()}}};
+  part.add(Method::post, "/v1/robots/{id}/missions", "requestMission", Role::operate,
            "Begins or ends a mission of a robot that does not announce missions. It begins and ends at the "
            "time of the robot's clock; samples before and after belong to no announced mission",
-           "mission-requested", request_mission,
+           {"mission-requested", requested_table.schema()}, request_mission,
            {.request_schema = "mission-request",
             .success_status = 202,
-            .error_statuses = {404, 409, 422},
+            .error_statuses = {404, 409},
             .run = Run::write});
-  return {
-      std::move(rows),
-      {{"mission-request", mission_event_input.schema()}, {"mission-requested", requested_table.schema()}}};
+  return part;
 }
 
 }  // namespace joulecast::api

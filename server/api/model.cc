@@ -309,46 +309,46 @@ Result<Response> proposals(const Services& services, const Request& request) {
 
 Part model_part() {
   using Type = Parameter::Type;
-  Rows rows;
-  rows.add(Method::post, "/v1/robots/{id}/models", "adoptModel", Role::operate,
+  const Schema robot =
+      described::with_words(described::of_type("string", true), "null in the list of the fleet");
+  Part part;
+  part.add(Method::post, "/v1/robots/{id}/models", "adoptModel", Role::operate,
            "Adopts a robot file, a diagnosis or a proposal as the next model version, after a back-test on "
            "missions that it was not fitted on; or puts an earlier version in force",
-           "model-adoption", post_model,
+           {"model-adoption", adoption_table.schema()}, post_model,
            {.former_path = "/v1/robots/{id}/model",
             .request_schema = "model-request",
             .rounded = true,
-            .error_statuses = {404, 409, 422},
+            .error_statuses = {404, 409},
             .run = Run::write});
-  rows.add(Method::get, "/v1/robots/{id}/models/diff", "compareModels", Role::read,
-           "Differences between two versions of a robot's model", "model-diff", diff,
+  part.add(Method::get, "/v1/robots/{id}/models/diff", "compareModels", Role::read,
+           "Differences between two versions of a robot's model", {"model-diff", difference_table.schema()},
+           diff,
            {.former_path = "/v1/robots/{id}/versions/diff",
             .parameters = {bounded(Type::integer, "from",
                                    "version before; default: the one that `to` was made from", 1),
                            bounded(Type::integer, "to", "version after; default: the one in force", 1)},
             .etag = true,
             .error_statuses = {404}});
-  rows.add(
+  part.add(
       Method::get, "/v1/robots/{id}/proposals", "listProposals", Role::read,
-      "Model proposals for a robot, newest first", "proposal-list", proposals,
+      "Model proposals for a robot, newest first",
+      {"proposal-list",
+       described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
+                          proposal_table.of_member(), {{"robot_id", robot}})},
+      proposals,
       {.parameters = {limit_parameter("proposals a page", 50, history::max_page_size), cursor_parameter()},
        .csv = true,
        .error_statuses = {404}});
-  rows.add(
+  part.add(
       Method::get, "/v1/proposals", "listFleetProposals", Role::read,
-      "Model proposals for the robots of the fleet, newest first", "proposal-list",
+      "Model proposals for the robots of the fleet, newest first", {"proposal-list"},
       [](const Services& services, const Request& request) {
         return proposals_of(services, request, std::nullopt);
       },
       {.parameters = {limit_parameter("proposals a page", 50, history::max_page_size), cursor_parameter()},
        .csv = true});
-  const Schema robot =
-      described::with_words(described::of_type("string", true), "null in the list of the fleet");
-  return {std::move(rows),
-          {{"model-adoption", adoption_table.schema()},
-           {"proposal-list",
-            described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
-                               proposal_table.of_member(), {{"robot_id", robot}})},
-           {"model-diff", difference_table.schema()}}};
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -268,8 +268,8 @@ Result<Response> matrix(const Services& services, const Request& r) {
 }  // namespace
 
 Part planning_part() {
-  Rows rows;
-  rows.push_back(
+  Part part{.schemas = fleet_autonomy_schemas()};
+  part.rows.push_back(
       {{.method = Method::post,
         .path = "/v1/robots/{id}/profile",
         .operation_id = "computeProfile",
@@ -282,43 +282,35 @@ Part planning_part() {
         .request_schema = "profile-request",
         .response_schema = "profile",
         .rounded = true,
-        .error_statuses = {404, 422},
+        .error_statuses = {404},
         .run = Run::compute},
        [](Services& services, http::Endpoint& endpoint) {
          answered_by(profile)(services, endpoint);
          endpoint.brief = [&services](Request& r) { return brief_profile(services, r); };
        }});
-  rows.add(Method::post, "/v1/robots/{id}/estimate", "estimateEnergy", Role::plan,
-           "Energy of a path driven by its minimum-energy motion (the default; independent of the robot's "
-           "history) or its usual driving, or of a given motion",
-           "estimate", estimate,
-           {.request_schema = "estimate-request",
-            .rounded = true,
-            .error_statuses = {404, 422},
-            .run = Run::compute});
-  rows.add(
+  part.add(
+      Method::post, "/v1/robots/{id}/estimate", "estimateEnergy", Role::plan,
+      "Energy of a path driven by its minimum-energy motion (the default; independent of the robot's "
+      "history) or its usual driving, or of a given motion",
+      {"estimate"}, estimate,
+      {.request_schema = "estimate-request", .rounded = true, .error_statuses = {404}, .run = Run::compute});
+  part.add(
       Method::post, "/v1/energy-matrix", "computeEnergyMatrix", Role::plan,
       "Energy and duration of every task with every robot, one row per robot, for minimum-energy motions "
       "(the default; equal for equal robots, independent of their history) or each robot's usual driving",
-      "energy-matrix", matrix,
-      {.request_schema = "energy-matrix-request", .error_statuses = {413, 422}, .run = Run::compute});
-  rows.add(Method::post, "/v1/robots/{id}/autonomy", "computeAutonomy", Role::plan,
-           "How far and how long a robot still goes, and whether it can do a list of tasks, driven as it "
-           "usually drives (the default: the charge must last for that) or by minimum-energy motions",
-           "autonomy", autonomy,
-           {.request_schema = "autonomy-request",
-            .rounded = true,
-            .error_statuses = {404, 422},
-            .run = Run::compute});
-  rows.add(
+      {"energy-matrix"}, matrix, {.request_schema = "energy-matrix-request", .run = Run::compute});
+  part.add(
+      Method::post, "/v1/robots/{id}/autonomy", "computeAutonomy", Role::plan,
+      "How far and how long a robot still goes, and whether it can do a list of tasks, driven as it "
+      "usually drives (the default: the charge must last for that) or by minimum-energy motions",
+      {"autonomy"}, autonomy,
+      {.request_schema = "autonomy-request", .rounded = true, .error_statuses = {404}, .run = Run::compute});
+  part.add(
       Method::post, "/v1/autonomy", "computeFleetAutonomy", Role::plan,
-      "The autonomy of many robots in one call", "fleet-autonomy",
+      "The autonomy of many robots in one call", {"fleet-autonomy"},
       [](Services& services, const Request& r) { return fleet_autonomy_answer(*r.json, services, r.stop); },
-      {.request_schema = "fleet-autonomy-request",
-       .rounded = true,
-       .error_statuses = {422},
-       .run = Run::compute});
-  return {std::move(rows), fleet_autonomy_schemas()};
+      {.request_schema = "fleet-autonomy-request", .rounded = true, .run = Run::compute});
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -303,75 +303,72 @@ Result<Response> recent(const Services& services, const Request& request) {
 }  // namespace
 
 Part robot_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/robots", "listRobots", Role::read,
+  using described::of_page;
+  const Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
+  Part part;
+  part.add(Method::get, "/v1/robots", "listRobots", Role::read,
            "The fleet: every robot that has a model or has sent telemetry, by id, with its live state",
-           "robot-list", list_robots,
+           {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
+           list_robots,
            {.parameters = {limit_parameter("robots a page", max_listed_robots, max_listed_robots),
                            cursor_parameter()},
             .csv = true,
             .rounded = true});
-  rows.add(Method::get, "/v1/robots/{id}", "getRobot", Role::read, "A robot's model in force", "robot-detail",
-           get_robot, {.etag = true, .error_statuses = {404}});
-  rows.add(Method::post, "/v1/robot-checks", "checkRobot", Role::plan,
-           "Reviews a robot file without storing it, as joulecast check does", "robot-check", check_file,
-           {.request_schema = "robot"});
-  rows.add(Method::put, "/v1/robots/{id}", "putRobot", Role::admin,
+  part.add(Method::get, "/v1/robots/{id}", "getRobot", Role::read, "A robot's model in force",
+           {"robot-detail", detail_table.schema()}, get_robot, {.etag = true, .error_statuses = {404}});
+  part.add(Method::post, "/v1/robot-checks", "checkRobot", Role::plan,
+           "Reviews a robot file without storing it, as joulecast check does",
+           {"robot-check", check_table.schema()}, check_file, {.request_schema = "robot"});
+  part.add(Method::put, "/v1/robots/{id}", "putRobot", Role::admin,
            "Stores a robot's model; a changed model becomes a new version and takes effect immediately",
-           "robot-version", put,
-           {.request_schema = "robot", .error_statuses = {409, 422}, .run = Run::write});
-  rows.add(Method::del, "/v1/robots/{id}", "removeRobot", Role::admin,
+           {"robot-version", stored_table.schema()}, put,
+           {.request_schema = "robot", .error_statuses = {409}, .run = Run::write});
+  part.add(Method::del, "/v1/robots/{id}", "removeRobot", Role::admin,
            "Removes a robot's model and ends its mission; with history=purge also deletes all its stored "
            "data except the event log",
-           "robot-removal", remove,
+           {"robot-removal", removal_table.schema()}, remove,
            {.parameters = {{.name = "history",
                             .description = "keep or purge the robot's missions and models",
                             .choices = {"keep", "purge"}}},
             .error_statuses = {404, 409},
             .run = Run::write});
-  rows.add(Method::get, "/v1/robots/{id}/state", "getRobotState", Role::read,
-           "A robot's live state: power, charge, mission, health of its telemetry", "robot-state", state,
+  part.add(Method::get, "/v1/robots/{id}/state", "getRobotState", Role::read,
+           "A robot's live state: power, charge, mission, health of its telemetry",
+           {"robot-state", state_table().schema()}, state,
            {.rounded = true, .error_statuses = {404}, .run = Run::io});
-  rows.add(Method::get, "/v1/robots/{id}/models", "listModels", Role::read,
-           "Every version of a robot's model, newest first", "model-list", versions,
+  part.add(Method::get, "/v1/robots/{id}/models", "listModels", Role::read,
+           "Every version of a robot's model, newest first",
+           {"model-list",
+            of_page("All versions of a robot model, newest first", "models",
+                    "versions of the model, newest first", version_table.of_member(), {{"robot_id", id}})},
+           versions,
            {.former_path = "/v1/robots/{id}/versions",
             .parameters = {limit_parameter("versions a page", history::max_page_size, history::max_page_size),
                            cursor_parameter()},
             .etag = true,
             .error_statuses = {404}});
-  rows.add(Method::get, "/v1/robots/{id}/models/{version}", "getModel", Role::read,
-           "A version of a robot's model", "model", get_version, {.etag = true, .error_statuses = {404}});
-  using described::of_page;
-  const Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
-  return {std::move(rows),
-          {{"model", version_table.schema()},
-           {"robot-check", check_table.schema()},
-           {"robot-detail", detail_table.schema()},
-           {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
-           {"robot-removal", removal_table.schema()},
-           {"robot-state", state_table().schema()},
-           {"robot-version", stored_table.schema()},
-           {"model-list",
-            of_page("All versions of a robot model, newest first", "models",
-                    "versions of the model, newest first", version_table.of_member(), {{"robot_id", id}})}}};
+  part.add(Method::get, "/v1/robots/{id}/models/{version}", "getModel", Role::read,
+           "A version of a robot's model", {"model", version_table.schema()}, get_version,
+           {.etag = true, .error_statuses = {404}});
+  return part;
 }
 
 Part recent_value_part() {
-  Rows rows;
-  rows.add(Method::get, "/v1/recent-values", "listRecentValues", Role::read,
+  const Schema window = described::with_words(described::of_type("number"), "s, greatest age of the values");
+  Part part;
+  part.add(Method::get, "/v1/recent-values", "listRecentValues", Role::read,
            "The last 90 s of robots' live values in columns, one a second, for charts that begin filled; "
            "kept in memory since the daemon's start",
-           "recent-values", recent,
+           {"recent-values", described::of_page("The last live values of robots, in columns", "robots",
+                                                "by id", recent_table.of_member(), {{"window_s", window}})},
+           recent,
            {.parameters = {{.name = "robot_id",
                             .description = "only this robot, or these, separated by commas; a robot that was "
                                            "not heard has empty columns"},
                            limit_parameter("robots a page", max_recent_robots, max_recent_robots),
                            cursor_parameter()},
             .rounded = true});
-  const Schema window = described::with_words(described::of_type("number"), "s, greatest age of the values");
-  return {std::move(rows),
-          {{"recent-values", described::of_page("The last live values of robots, in columns", "robots",
-                                                "by id", recent_table.of_member(), {{"window_s", window}})}}};
+  return part;
 }
 
 }  // namespace joulecast::api

@@ -30,7 +30,7 @@ constexpr std::pair<const char*, Part (*)()> parts[] = {
 std::vector<http::Endpoint> endpoints(Services* services) {
   std::vector<http::Endpoint> all;
   for (const auto& [tag, part] : parts) {
-    Rows rows = part().rows;
+    std::vector<TableRow> rows = part().rows;
     for (auto& [endpoint, bind] : rows) {
       endpoint.tag = tag;
       if (endpoint.rounded) endpoint.parameters.push_back(digits_parameter());

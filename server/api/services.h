@@ -75,18 +75,30 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
   };
 }
 
-// The endpoints of a part: the common members, the answering function, and the other members of each row.
-struct Rows : std::vector<TableRow> {
+// The schema of an answer; the name alone: it is among the schemas of this part or of others.
+struct AnswerSchema {
+  std::string name = {};
+  Schema schema = {};
+};
+
+// Endpoints of one kind, and the schemas that their tables make.
+struct Part {
+  std::vector<TableRow> rows = {};
+  described::Schemas schemas = {};
+
+  // The common members of an endpoint, the function that answers it, and the other members.
   template <class Answer>
   void add(Method method, std::string path, std::string operation_id, Role role, std::string summary,
-           std::string response_schema, Answer answer, http::Endpoint row = {}) {
+           AnswerSchema response, Answer answer, http::Endpoint row = {}) {
     row.method = method;
     row.path = std::move(path);
     row.operation_id = std::move(operation_id);
     row.role = role;
     row.summary = std::move(summary);
-    row.response_schema = std::move(response_schema);
-    push_back({std::move(row), answered_by(answer)});
+    row.response_schema = response.name;
+    rows.push_back({std::move(row), answered_by(answer)});
+    if (!response.schema.is_null())
+      schemas.emplace_back(std::move(response.name), std::move(response.schema));
   }
 };
 
@@ -96,11 +108,6 @@ std::vector<http::Endpoint> endpoints(Services* services);
 // The schemas of all endpoints.
 described::Schemas schemas();
 
-// Endpoints of one kind, and the schemas that their tables make.
-struct Part {
-  Rows rows;
-  described::Schemas schemas = {};
-};
 Part robot_part();
 Part attention_part();
 Part model_part();
