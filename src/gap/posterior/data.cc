@@ -160,7 +160,9 @@ void add_pieces(const Metered& m, std::size_t group, double delay_s, PowerRows& 
   for (; knots.time_s[k] < to_s; ++k) {
     const double whole_s = knots.time_s[k + 1] - knots.time_s[k];
     const double a = std::max(from_s, knots.time_s[k]), b = std::min(to_s, knots.time_s[k + 1]);
-    Window& w = rows.instants.emplace_back(place_at(m, m.readings.rows_of(group).front()));
+    const auto after = std::ranges::lower_bound(m.track.time_s, (a + b) / 2) - m.track.time_s.begin();
+    const auto last = static_cast<std::ptrdiff_t>(m.track.time_s.size()) - 1;
+    Window& w = rows.instants.emplace_back(place_at(m, static_cast<std::size_t>(std::min(after, last))));
     w.t_s = (a + b) / 2;
     w.length_s = b - a;
     for (const std::size_t s : {0u, 1u}) {
