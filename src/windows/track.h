@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -46,6 +47,11 @@ double median_period_s(const telemetry::Recording& mission);
 
 Track make_track(const telemetry::Recording& mission, const robot::RobotModel& robot,
                  std::span<const std::string> covariates, double period_s, const WindowSettings& settings);
+
+// Longest time between samples inside a window or a row of power.
+inline double longest_gap_s(double period_s, const WindowSettings& settings = {}) {
+  return std::max(settings.longest_gap_s, 2.5 * period_s);
+}
 
 inline constexpr double fewest_rows = 4;       // a window lasts, as its outermost have no weight
 inline constexpr double moving_rad_s = 0.10;   // slowest wheel that surely turns

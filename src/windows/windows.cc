@@ -161,7 +161,7 @@ class MissionWindows {
         settings_(settings),
         number_(number),
         period_s_(median_period_s(mission)),
-        longest_gap_s_(std::max(settings.longest_gap_s, 2.5 * period_s_)),
+        longest_gap_s_(longest_gap_s(period_s_, settings)),
         track_(make_track(mission, robot, covariates, period_s_, settings)) {}
 
   // `position` counts windows over all missions, kept or not.

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <functional>
-#include <random>
 #include <vector>
 
 #include "tests/support/sample_robots.h"

@@ -58,7 +58,7 @@ class Meterings {
 
  private:
   bool follows(std::size_t n) const {
-    return n > 0 && n < at_.size() && time_s_[n] - time_s_[n - 1] <= std::max(knot_s, 2.5 * period_s_);
+    return n > 0 && n < at_.size() && time_s_[n] - time_s_[n - 1] <= windows::longest_gap_s(period_s_);
   }
   double begin_of(std::size_t n) const {
     return follows(n) ? std::midpoint(time_s_[n - 1], time_s_[n]) : time_s_[n] - period_s_ / 2;
@@ -195,7 +195,8 @@ PowerRows make_rows(std::span<const Metered> metered, double delay_s, const AddM
 
 // Terms of the power of two motors by their speeds w and accelerations a: w T + R i^2 with a torque T, and a
 // current i that is proportional to it, of friction on each side, scrub, mass and yaw inertia.
-std::array<double, 12> power_terms(const Window& w) {
+using MotionTerms = std::array<double, 12>;
+MotionTerms motion_terms(const Window& w) {
   const auto& [w0, w1] = w.speed_rad_s;
   const auto& [a0, a1] = w.acceleration_rad_s2;
   const double s0 = std::tanh(w0 / windows::moving_rad_s), s1 = std::tanh(w1 / windows::moving_rad_s);
@@ -216,17 +217,11 @@ std::array<double, 12> power_terms(const Window& w) {
 
 // Squares of the power that a regression on these terms leaves [W^2], of each row.
 Eigen::ArrayXd left_by_regression(const PowerRows& rows) {
-  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(rows.size()), std::tuple_size_v<decltype(power_terms({}))>);
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    double lengths = 0;
-    for (std::size_t k = rows.first[r]; k < rows.first[r + 1]; ++k) {
-      const Window& w = rows.instants[k];
-      const std::array terms = power_terms(w);
-      x.row(ix(r)) += w.length_s * Eigen::Map<const Eigen::RowVectorXd>(terms.data(), ix(terms.size()));
-      lengths += w.length_s;
-    }
-    x.row(ix(r)) /= lengths;
-  }
+  std::vector<MotionTerms> terms(rows.instants.size());
+  std::ranges::transform(rows.instants, terms.begin(), motion_terms);
+  Eigen::MatrixXd x(ix(rows.size()), std::tuple_size_v<MotionTerms>);
+  for (Eigen::Index j = 0; j < x.cols(); ++j)
+    x.col(j) = rows.mean([&](const Window& w) { return terms[ux(&w - rows.instants.data())][ux(j)]; });
   const Eigen::VectorXd y = rows.measured_w();
   return (y - x * x.completeOrthogonalDecomposition().solve(y)).array().square();
 }
