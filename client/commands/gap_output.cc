@@ -154,8 +154,8 @@ void print_held_out(const Json& d) {
   fmt::print("power error on held-out data: {}\n", line);
   if (!found) return;
   const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
-  fmt::print("  the effects close {:.0f} % of the gap (95 % interval {:.0f} to {:.0f} %){}\n",
-             percent_at(s, "fraction"), 100 * low, 100 * high,
+  fmt::print("  the effects close {} % of the gap (95 % interval {:.0f} to {:.0f} %){}\n",
+             number_text(percent_at(s, "fraction"), 0), 100 * low, 100 * high,
              low < 0 && high >= 0 ? ": they may not help" : "");
 }
 
@@ -203,8 +203,10 @@ void print_effect(const Json& e) {
     fmt::print(" ({} with its alternatives)", gap::probability_text(number_or_nan(e["group"])));
   if (number_or_nan(member_at(e, "power_w")) > 0)
     fmt::print(", {:.3g} W on average", number_or_nan(e["power_w"]));
-  if (e["share"].is_number())
-    fmt::print("; without it {:.0f} % of the closed gap returns", percent_at(e, "share"));
+  if (const double share = percent_at(e, "share"); share > 100)
+    fmt::print("; without it the error is larger than with the robot file");
+  else if (std::isfinite(share))
+    fmt::print("; without it {} % of the closed gap returns", number_text(share, 0));
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {

@@ -138,7 +138,7 @@ bool check_supply(const CheckContext& c, Checks& checks) {
   return true;
 }
 
-// True if the sides or signs of the wheels are wrong: correct readings then appear unsigned.
+// True if the readings of the wheels are wrong: correct readings then appear unsigned.
 bool wheels_look_wrong(const CheckContext& c) {
   Checks checks;
   check_faults(c, checks);
@@ -151,14 +151,14 @@ bool never_negative(const ValueTally& t) {
 }
 
 // Detects a battery's current without a sign: a battery that is charged has a higher voltage, by as much as
-// discharging lowers it. A smaller rise has another cause.
+// discharging lowers it. A smaller rise has another cause. Wheels tell when it is charged.
 void check_unsigned_battery(const CheckContext& c, Checks& checks) {
   if (!never_negative(c.tally(reading::battery_current))) return;
   const BlockFit fit = fit_blocks(c.blocks(Relation::sag), 0, {1, 2});
   const Estimate driving = estimate(fit, 0), charging = estimate(fit, Eigen::Vector2d(1, 1));
   if (!driving.sure() || driving.value > 0 || !charging.sure() || charging.value < 0) return;
   const Estimate ratio = charging * (-1 / driving.value);
-  if (ratio.interval()[1] < 1) return;
+  if (ratio.interval()[1] < 1 || wheels_look_wrong(c)) return;
   add_check(checks, "battery_current_unsigned", "battery_current", ratio, true,
             "battery_current is never negative, and while the motors charge the battery its voltage rises "
             "with it, {} times as much as it falls otherwise: its sign is lost; joulecast expects it "

@@ -115,7 +115,7 @@ TEST(VerdictText, NamesContradictingEvidence) {
                                     "the noise floor is 1\u00a0%")));
   d.shrinkage->after = 0.3;
   d.shrinkage->interval = {-0.7, -0.3};
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("effect increases the gap: from 20\u00a0% to 30\u00a0%")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("effect increases the gap by 30\u00a0% to 70\u00a0%")));
 }
 
 TEST(VerdictText, ReportsReasonsWithoutEffects) {

@@ -331,8 +331,7 @@ class Explainer {
     // A function that does not predict is no evidence against effects that do.
     if (v == Verdict::outside && !function_predicts())
       v = surest() >= named ? Verdict::effects : Verdict::inconclusive;
-    const bool mismatched =
-        h.known && (a_.factors.back() > named || h.file - h.explanation > mismatched_file);
+    const bool mismatched = h.known && h.file - h.explanation > mismatched_file;
     // A function of the motion is then the file's: of speed, acceleration or turning.
     constexpr std::array<std::string_view, 3> motion{"speed", "acceleration", "yaw_rate"};
     const bool other = v == Verdict::outside && std::ranges::find(motion, a_.outside.follows) == motion.end();
@@ -370,7 +369,7 @@ class Explainer {
 
   double surest() const {
     double most = 0;
-    for (const ExplainedBy& e : a_.effects) most = std::max(most, e.probability);
+    for (const ExplainedBy& e : a_.effects) most = std::max(most, e.group);
     return most;
   }
 
@@ -454,8 +453,7 @@ Explained explain(const Fit& fit) {
       });
       if (known || e.group < named) continue;
       if (answer.verdict == Verdict::none) answer.verdict = Verdict::effects, answer.probability = 0;
-      if (answer.verdict == Verdict::effects)
-        answer.probability = std::max(answer.probability, e.probability);
+      if (answer.verdict == Verdict::effects) answer.probability = std::max(answer.probability, e.group);
       answer.model.push_back(own->catalogue.hypotheses[e.hypothesis].effect);
       for (std::size_t k = 0; k < e.parameters.size(); ++k)
         answer.model.back().values[k] = e.parameters[k].value;

@@ -121,8 +121,8 @@ class Reasons {
     const Shrinkage& s = *d_.shrinkage;
     const bool one = d_.effects.size() == 1;
     if (s.interval[1] < 0)
-      say("on held-out data the {} the gap: from {} to {}", one ? "effect increases" : "effects increase",
-          percent(s.before), percent(s.after));
+      say("on held-out data the {} the gap by {} to {}", one ? "effect increases" : "effects increase",
+          percent(-s.interval[1]), percent(-s.interval[0]));
     else if (s.interval[0] < 0)
       say("the benefit for held-out data is uncertain: the gap shrinks by {} to {}", percent(s.interval[0]),
           percent(s.interval[1]));

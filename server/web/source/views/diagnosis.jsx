@@ -318,7 +318,7 @@ const effectColumns = [
   column('effect', 'Effect', Effect, { head: true }),
   figure('probability', 'Probability', (e) => chance(e.probability)),
   column('strength', 'Strength', strengths),
-  figure('share', 'Returns without it', (e) => share(e.share, 0), {
+  figure('share', 'Returns without it', (e) => (e.share > 1 ? '> 100 %' : share(e.share, 0)), {
     hint: 'part of the closed gap that returns if this effect is omitted',
   }),
   figure('group', 'Group', (e) => chance(e.group), {
