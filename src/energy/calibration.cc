@@ -27,8 +27,9 @@ constexpr double least_significance = 2;  // standard errors from zero; other es
 // With fewer blocks than these Student's t is wide and itself uncertain.
 constexpr std::size_t enough_missions = 5, wanted_blocks = 8, least_blocks = 4;
 
-// What the equations are made of: the torque equation's columns, the torque that the file explains, current
-// and voltage.
+// What the equations are made of: the torque equation's columns, the torque that the file explains, and the
+// current that drives; current, speed and voltage of the electrical equation. All contain the file's effects,
+// so that the coefficients are the file's parameters.
 enum Column : Eigen::Index {
   friction_right,
   friction_left,
@@ -36,7 +37,9 @@ enum Column : Eigen::Index {
   straight,
   turning,
   known_nm,
+  driving_a,
   current_a,
+  speed_rad_s,
   voltage_v,
   column_count
 };
@@ -132,7 +135,7 @@ Electrical fit_electrical(const Moments& m, Electrical given, bool resistance, b
     if (fitted) of.conservativeResize(Eigen::NoChange, of.cols() + 1), of.rightCols<1>() = column;
   };
   add(resistance, Values::Unit(current_a), given.resistance_ohm);
-  add(constant, Values::Unit(viscous), given.constant_v_s_rad);
+  add(constant, Values::Unit(speed_rad_s), given.constant_v_s_rad);
   if (delay) add(true, Values::Unit(straight) + Values::Unit(turning), 0);
   const Eigen::MatrixXd a = of.transpose() * m * of;
   const Eigen::VectorXd x = a.ldlt().solve(of.transpose() * m * rest);
@@ -143,10 +146,16 @@ Electrical fit_electrical(const Moments& m, Electrical given, bool resistance, b
   return given;
 }
 
+// The file's model, and with more dry or viscous friction.
+constexpr double friction_step_nm = 0.01, viscous_step_nm_s_rad = 1e-3;
+struct DriveModels {
+  dynamics::DriveModel file, with_friction, with_viscous;
+};
+
 class Calibrator {
  public:
-  Calibrator(const robot::RobotModel& robot, const CalibrationOptions& options, dynamics::DriveModel known)
-      : robot_(robot), options_(options), known_(std::move(known)) {
+  Calibrator(const robot::RobotModel& robot, const CalibrationOptions& options, const DriveModels& models)
+      : robot_(robot), options_(options), models_(models) {
     const WheelInertia inertia = wheel_inertia(robot);
     file_.resistance_ohm = robot.motor.resistance_ohm;
     file_.constant_v_s_rad = robot.motor.voltage_constant_v_s_rad * robot.motor.gear_ratio;
@@ -228,34 +237,51 @@ class Calibrator {
   }
 
   void observe(const windows::Window& w, const ReadingNoise* noise, Moments& block) {
-    const auto total = known_.balance(windows::instant_of(w)).total_nm;
+    const dynamics::Instant at = windows::instant_of(w);
+    const dynamics::DriveModel& model = models_.file;
+    const dynamics::TorqueBalance<double> balance = model.balance(at);
+    const auto with_friction = models_.with_friction.balance(at).total_nm,
+               with_viscous = models_.with_viscous.balance(at).total_nm;
+    const dynamics::Parameters<double>& p = model.parameters();
+    const robot::Motor& motor = robot_.motor;
     const auto& acceleration = w.acceleration_rad_s2;
     const auto off = noise ? noise->in(w) : ReadingNoise::OfWindow{};
     for (std::size_t side : {0u, 1u}) {
       const double sign = side == robot::right ? 1 : -1;
-      Values v = Values::Zero();
+      const double total = balance.total_nm[side];
+      const double viscous_rad_s = (with_viscous[side] - total) / viscous_step_nm_s_rad;
+      // Inertia is transmitted by the gear, as friction on its far side.
+      const double through = balance.transmitted_nm[side] + p.gear_friction_share * balance.friction_nm[side];
+      const double of_inertia = 1 + (through == 0 ? 0 : balance.gear_nm[side] / through);
+      // Readings to columns: current, voltage and speed.
+      Eigen::Matrix<double, column_count, 3> of_reading = Eigen::Matrix<double, column_count, 3>::Zero();
+      of_reading(driving_a, 0) = p.torque_constant_nm_a / (motor.torque_constant_nm_a * motor.gear_ratio);
+      of_reading(current_a, 0) = model.resistance(side, at) / motor.resistance_ohm;
+      of_reading(voltage_v, 1) = 1;
+      of_reading(viscous, 2) = viscous_rad_s / w.speed_rad_s[side];
+      of_reading(speed_rad_s, 2) =
+          p.voltage_constant_v_s_rad / (motor.voltage_constant_v_s_rad * motor.gear_ratio);
+      const double current = (w.current_a[side] - p.motor_current.bias) / (1 + p.motor_current.gain);
+      const bool measured = std::isfinite(w.voltage_v[side]);
+      has_voltage_ &= measured;
+      Values v = of_reading * Eigen::Vector3d(current, 0, w.speed_rad_s[side]);
       v[side == robot::right ? friction_right : friction_left] =
-          dynamics::smooth_sign(w.speed_rad_s[side], dynamics::friction_width_rad_s);
-      v[viscous] = w.speed_rad_s[side];
-      v[straight] = (acceleration[0] + acceleration[1]) / 2;
-      v[turning] = sign * (acceleration[0] - acceleration[1]) / 2;
-      // `known_` has no friction but the file's inertia; the inertia without payload is fitted instead.
-      v[known_nm] = total[side] - file_.torque[straight] * v[straight] - file_.torque[turning] * v[turning];
-      v[current_a] = w.current_a[side];
-      has_voltage_ &= std::isfinite(w.voltage_v[side]);
-      v[voltage_v] = std::isfinite(w.voltage_v[side]) ? w.voltage_v[side] : 0;
+          (with_friction[side] - total) / friction_step_nm;
+      v[straight] = of_inertia * (acceleration[0] + acceleration[1]) / 2;
+      v[turning] = of_inertia * sign * (acceleration[0] - acceleration[1]) / 2;
+      v[known_nm] = total - file_.torque.dot(v.head<torque_count>());
+      v[voltage_v] = measured ? (w.voltage_v[side] - p.motor_voltage.bias) / (1 + p.motor_voltage.gain) -
+                                    p.brush_drop_v * dynamics::smooth_sign(current, dynamics::brush_width_a)
+                              : 0;
       block += v * v.transpose();
       observations_.push_back(v);
-      slowest_rad_s_ = std::min(slowest_rad_s_, std::fabs(v[viscous]));
-      fastest_rad_s_ = std::max(fastest_rad_s_, std::fabs(v[viscous]));
+      slowest_rad_s_ = std::min(slowest_rad_s_, std::fabs(w.speed_rad_s[side]));
+      fastest_rad_s_ = std::max(fastest_rad_s_, std::fabs(w.speed_rad_s[side]));
       if (!noise) continue;
-      constexpr std::array<Eigen::Index, 3> measured{current_a, voltage_v, viscous};
-      for (Eigen::Index a = 0; a < 3; ++a)
-        for (Eigen::Index b = 0; b < 3; ++b)
-          if (const double both = off.of_means[side](a, b); std::isfinite(both))
-            block(measured[static_cast<std::size_t>(a)], measured[static_cast<std::size_t>(b)]) -= both;
-      const double equal = (off.of_slope[0] + off.of_slope[1]) / 4,
-                   apart = sign * (off.of_slope[0] - off.of_slope[1]) / 4;
+      block -= of_reading * off.of_means[side].unaryExpr([](double c) { return std::isfinite(c) ? c : 0; }) *
+               of_reading.transpose();
+      const double equal = of_inertia * of_inertia * (off.of_slope[0] + off.of_slope[1]) / 4,
+                   apart = of_inertia * of_inertia * sign * (off.of_slope[0] - off.of_slope[1]) / 4;
       block(straight, straight) -= equal;
       block(turning, turning) -= equal;
       block(straight, turning) -= apart;
@@ -302,7 +328,7 @@ class Calibrator {
     s.constant_v_s_rad = e.constant_v_s_rad;
     const std::vector<Eigen::Index> free = free_columns();
     s.torque(free).setZero();
-    const Row target = ratio_ * s.constant_v_s_rad * m.col(current_a).head<torque_count>() -
+    const Row target = ratio_ * s.constant_v_s_rad * m.col(driving_a).head<torque_count>() -
                        m.col(known_nm).head<torque_count>() -
                        m.topLeftCorner<torque_count, torque_count>() * s.torque;
     const Eigen::MatrixXd a = m(free, free);
@@ -400,8 +426,8 @@ class Calibrator {
     double torque_square = 0, voltage_square = 0;
     for (const Values& o : observations_) {
       const double nm =
-          ratio_ * s.constant_v_s_rad * o[current_a] - o[known_nm] - s.torque.dot(o.head<torque_count>());
-      const double v = o[voltage_v] - s.resistance_ohm * o[current_a] - s.constant_v_s_rad * o[viscous];
+          ratio_ * s.constant_v_s_rad * o[driving_a] - o[known_nm] - s.torque.dot(o.head<torque_count>());
+      const double v = o[voltage_v] - s.resistance_ohm * o[current_a] - s.constant_v_s_rad * o[speed_rad_s];
       torque_square += nm * nm;
       voltage_square += v * v;
     }
@@ -429,7 +455,7 @@ class Calibrator {
 
   const robot::RobotModel& robot_;
   CalibrationOptions options_;
-  dynamics::DriveModel known_;
+  const DriveModels& models_;
   Solution file_;  // the file's values; parameters that are not fitted stay there
   double ratio_ = 1;
   Fitted fitted_{};
@@ -456,11 +482,12 @@ double half_window_for(std::span<const DriveRun> runs) {
 Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot,
                                          std::span<const telemetry::Recording> missions,
                                          const CalibrationOptions& options) {
-  robot::RobotModel frictionless = robot;
-  frictionless.motor.friction_torque_nm = {0, 0};
-  frictionless.motor.viscous_friction_nm_s_rad = 0;
-  TRY_ASSIGN(auto known, dynamics::drive_model(frictionless));
-  return Calibrator(robot, options, std::move(known)).run(missions);
+  TRY_ASSIGN(const auto effects, dynamics::active_effects(robot));
+  robot::RobotModel rubbing = robot, viscous = robot;
+  for (double& torque_nm : rubbing.motor.friction_torque_nm) torque_nm += friction_step_nm;
+  viscous.motor.viscous_friction_nm_s_rad += viscous_step_nm_s_rad;
+  const DriveModels models{{robot, effects}, {rubbing, effects}, {viscous, effects}};
+  return Calibrator(robot, options, models).run(missions);
 }
 
 Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s) {

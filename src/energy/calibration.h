@@ -23,8 +23,10 @@ namespace joulecast::energy {
 //   r/(2l)
 //
 // T_0 is the torque that the robot file's model attributes to payload, centre of mass and adopted effects.
-// Such runs cannot distinguish mass from rotor inertia (only J_f is seen), nor the scale of all torques from
-// K_t. The file's ratio K_t/K_w (1 for an ideal machine) ties K_t to the K_w that the voltages show.
+// Effects that change a term (gear efficiency, friction, constants, brushes, sensors of the motors) are in
+// it, so that the coefficients are the file's parameters beside these effects. Such runs cannot distinguish
+// mass from rotor inertia (only J_f is seen), nor the scale of all torques from K_t. The file's ratio K_t/K_w
+// (1 for an ideal machine) ties K_t to the K_w that the voltages show.
 
 // Both are moment equations over smooth windows (windows/windows.h), whose means and slopes satisfy them
 // exactly. The readings' own noise, which least squares takes for motion and current (errors in variables:

@@ -115,6 +115,67 @@ TEST(CalibrateDrive, WholeRunsRecoverEveryParameter) {
               robot.mass.yaw_inertia_kg_m2 * 10 * rounding);
 }
 
+// The equations of the effects are written out here: nothing of the drive model's is used.
+TEST(CalibrateDrive, CountsEffectsOfFileOnce) {
+  robot::RobotModel truth = nomad();
+  truth.motor.inductance_h = 0;
+  truth.motor.rotor_inertia_kg_m2 = 0.02;
+  truth.effects = {{"gear_efficiency", {{"loss", 0.12}, {"of_friction", 0.7}}},
+                   {"coulomb_friction", {{"ratio", 0.4}, {"extra_nm", 0.05}}},
+                   {"viscous_friction", {{"ratio", 1.5}, {"extra_nm_s_rad", 0}}},
+                   {"resistance_error", {{"ratio", 0.25}}},
+                   {"brush_drop", {{"voltage_v", 0.6}}},
+                   {"torque_constant_loss", {{"loss", 0.1}, {"voltage_share", 1}}}};
+  const robot::Motor& m = truth.motor;
+  const double radius_m = truth.kinematics.wheel_radius_m;
+  const double inertia_kg_m2 = (truth.mass.chassis_kg + 2 * truth.mass.wheel_kg) * radius_m * radius_m / 2 +
+                               truth.mass.wheel_inertia_kg_m2 + m.rotor_inertia_kg_m2;
+  std::vector<std::vector<Sample>> samples;
+  for (const auto& [start, slope] :
+       {std::pair{1.0, 0.0}, {4, 0}, {8, 0}, {1, 1.2}, {9, -1.2}, {-2, -0.8}, {-5, 0}}) {
+    std::vector<Sample>& run = samples.emplace_back();
+    for (int k = 0; k <= 300; ++k) {
+      Sample& sample = run.emplace_back();
+      sample.utime_us = 20'000LL * k;
+      sample.payload_kg = 0;
+      const double speed = start + slope * 0.02 * k, direction = speed > 0 ? 1 : -1;
+      for (std::size_t s : {0u, 1u}) {
+        const double friction =
+            (1.4 * m.friction_torque_nm[s] + 0.05) * direction + 2.5 * m.viscous_friction_nm_s_rad * speed;
+        const double load = inertia_kg_m2 * slope;
+        const double torque = load + friction + 0.12 * std::fabs(load + 0.7 * friction) * direction;
+        const double current = torque / (0.9 * m.torque_constant_nm_a * m.gear_ratio);
+        sample.wheel_velocity_rad_s[s] = speed;
+        sample.motor_current_a[s] = current;
+        sample.motor_voltage_v[s] = 1.25 * m.resistance_ohm * current + std::copysign(0.6, current) +
+                                    0.9 * m.voltage_constant_v_s_rad * m.gear_ratio * speed;
+      }
+    }
+  }
+  std::vector<telemetry::Recording> runs;
+  for (const auto& s : samples) runs.push_back({"", "", 0, s});
+  for (const CalibrationMethod method : {CalibrationMethod::steady, CalibrationMethod::whole}) {
+    robot::RobotModel start = truth;
+    start.motor.resistance_ohm *= 1.3;
+    start.motor.friction_torque_nm = {0.3, 0.3};
+    start.motor.viscous_friction_nm_s_rad = 0.003;
+    if (method == CalibrationMethod::whole) start.motor.rotor_inertia_kg_m2 = 0.04;
+    const auto fit = calibrate_drive(start, runs, {.method = method});
+    ASSERT_TRUE(fit) << describe(fit.error());
+    const robot::Motor& found = fit->robot.motor;
+    EXPECT_EQ(fit->robot.effects, truth.effects);
+    // The model's brush drop rises smoothly from zero current, by 5e-4 less at 0.3 A.
+    const auto expect_near = [](double value, double true_value) {
+      EXPECT_NEAR(value, true_value, 5e-4 * true_value);
+    };
+    for (std::size_t s : {0u, 1u}) expect_near(found.friction_torque_nm[s], m.friction_torque_nm[s]);
+    expect_near(found.viscous_friction_nm_s_rad, m.viscous_friction_nm_s_rad);
+    expect_near(found.resistance_ohm, m.resistance_ohm);
+    expect_near(found.torque_constant_nm_a, m.torque_constant_nm_a);
+    expect_near(found.rotor_inertia_kg_m2, m.rotor_inertia_kg_m2);
+  }
+}
+
 // Voltage staircases driven through (2-43) by Runge-Kutta steps of 1 ms, sampled at 50 Hz.
 std::vector<Sample> simulated(const robot::RobotModel& robot, double direction, std::mt19937& random) {
   const auto model = *dynamics::drive_model(robot);
