@@ -751,13 +751,14 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
     least.emplace(std::move(made));
   }
 
-  std::vector<PricedLeg> typical;
+  forecast::TypicalDriving typical;
   if (minimum_energy) {
-    TRY_ASSIGN(typical, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
+    TRY_ASSIGN(auto legs, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
+    typical = forecast::typical_driving(forecaster, std::move(legs));
   } else {
-    typical = forecast::price_typical(forecaster, pricer, input.pace, out.payload_kg);
+    typical = forecast::typical_driving(forecaster, pricer, input.pace, out.payload_kg);
   }
-  out.reach = forecast::reach(forecaster, *robot.battery, out.charge, forecast::sum_of(forecaster, typical));
+  out.reach = forecast::reach(forecaster, *robot.battery, out.charge, typical);
   if (!with_plan) return out;
 
   std::optional<Pricing> best;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 #include <utility>
 
@@ -21,8 +22,9 @@ struct Budget {
   double deviation_j = 0;
 };
 
-double mean_power(const PlanSum& sum, double energy_j) {
-  return sum.duration_s > 0 ? energy_j / sum.duration_s : 0;
+double mean_power(const Forecaster& forecaster, const PlanSum& sum, double energy_j) {
+  const double duration_s = forecaster.duration(sum).expected();
+  return duration_s > 0 ? energy_j / duration_s : 0;
 }
 
 double lowest_charge(const ChargeMap& battery, const Charge& charge, double power_w) {
@@ -35,16 +37,18 @@ Budget budget(const ChargeMap& battery, const Charge& charge, double lowest, dou
                                battery.relative_deviation() * std::max(0.0, energy_j))};
 }
 
-// Quantiles of a difference of independent parts, from each one's own: exact for normals, and close where one
+// Quantiles of a sum of independent parts, from each one's own: exact for normals, and close where one
 // dominates.
-double joined(double middle, double offset_a, double offset_b, double sign) {
-  return middle + sign * std::sqrt(offset_a * offset_a + offset_b * offset_b);
+double joined(double middle, double sign, std::initializer_list<double> offsets) {
+  double squares = 0;
+  for (const double offset : offsets) squares += offset * offset;
+  return middle + sign * std::sqrt(squares);
 }
 
 TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge, double lowest,
                   const PlanSum& sum) {
   const Prediction p = forecaster.energy(sum);
-  const double power = mean_power(sum, p.expected());
+  const double power = mean_power(forecaster, sum, p.expected());
   const Budget spend = budget(battery, charge, lowest, power);
   TaskOutlook out;
   out.duration_s = forecaster.duration(sum).quantile(0.5);
@@ -61,7 +65,7 @@ double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, cons
     PlanSum waited = plan;
     forecaster.extend(waited, {Motion::stand, 0, 0, {wait_s, standing_w * wait_s, 0, 0}});
     const Prediction p = forecaster.energy(waited);
-    const Budget spend = budget(battery, charge, lowest, mean_power(waited, p.expected()));
+    const Budget spend = budget(battery, charge, lowest, mean_power(forecaster, waited, p.expected()));
     return p.probability_below(spend.energy_j, spend.deviation_j) >= confidence;
   };
   if (!(standing_w > 0)) return std::numeric_limits<double>::infinity();
@@ -141,7 +145,7 @@ std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeM
       std::hypot(charge.deviation, battery.relative_deviation() * (charge.fraction - middle));
   for (std::size_t k = 0; k < stated_quantiles.size(); ++k)
     out[k] =
-        joined(middle, out[k] - middle, normal_quantile[k] * deviation, stated_quantiles[k] < 0.5 ? -1 : 1);
+        joined(middle, stated_quantiles[k] < 0.5 ? -1 : 1, {out[k] - middle, normal_quantile[k] * deviation});
   for (double& c : out) c = std::clamp(c, 0.0, 1.0);
   return out;
 }
@@ -192,15 +196,35 @@ std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payloa
   return legs;
 }
 
-std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
-                                     const StatedPace& stated, double payload_kg) {
-  return price(forecaster, pricer, typical_legs(forecaster, payload_kg), stated, !forecaster.typical.empty());
+TypicalDriving typical_driving(const Forecaster& forecaster, std::vector<PricedLeg> legs) {
+  TypicalDriving typical;
+  std::vector<std::array<double, 3>> amounts;  // energy, way and duration of each leg
+  std::array<double, 3> all{};
+  for (PricedLeg& leg : legs) {
+    leg.may_halt = true;
+    forecaster.extend(typical.sum, leg);
+    PlanSum one;
+    forecaster.extend(one, leg);
+    amounts.push_back({forecaster.energy(one).expected(), one.way_m, forecaster.duration(one).expected()});
+    for (std::size_t k = 0; k < all.size(); ++k) all[k] += amounts.back()[k];
+  }
+  for (const auto& [energy_j, way_m, duration_s] : amounts) {
+    typical.way_error = std::hypot(typical.way_error, way_m / all[1] - energy_j / all[0]);
+    typical.duration_error = std::hypot(typical.duration_error, duration_s / all[2] - energy_j / all[0]);
+  }
+  return typical;
+}
+
+TypicalDriving typical_driving(const Forecaster& forecaster, const LegPricer& pricer,
+                               const StatedPace& stated, double payload_kg) {
+  return typical_driving(forecaster,
+                         price(forecaster, pricer, typical_legs(forecaster, payload_kg), stated, false));
 }
 
 double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
                               const PlanSum& plan) {
   const Prediction p = forecaster.energy(plan);
-  const double power = mean_power(plan, p.expected());
+  const double power = mean_power(forecaster, plan, p.expected());
   const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power), power);
   return p.probability_below(spend.energy_j, spend.deviation_j);
 }
@@ -244,7 +268,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
   PlanSum whole = sums.back();
   if (out.charger_given) extend(whole, forecaster, tasks.empty() ? from_here : tasks.back().to_charger);
   const Prediction all = forecaster.energy(whole);
-  const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected()));
+  const double lowest = lowest_charge(battery, charge, mean_power(forecaster, whole, all.expected()));
 
   double expected_before = 0, probability_before = 1, worst = 0;
   const auto note = [&](TaskOutlook& stage_outlook, const PlanSum& sum, std::size_t index) {
@@ -280,7 +304,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
     PlanSum plan = sums[k];
     extend(plan, forecaster, k == 0 ? from_here : tasks[k - 1].to_charger);
     const Prediction p = forecaster.energy(plan);
-    const Budget spend = budget(battery, charge, lowest, mean_power(plan, p.expected()));
+    const Budget spend = budget(battery, charge, lowest, mean_power(forecaster, plan, p.expected()));
     const double probability = p.probability_below(spend.energy_j, spend.deviation_j);
     if (probability < confidence) break;
     out.latest_departure = Departure{k, forecaster.duration(sums[k]).quantile(0.5), 0, probability};
@@ -293,35 +317,48 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
 }
 
 Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
-            const PlanSum& once) {
-  Prediction p = forecaster.energy(once);
+            const TypicalDriving& typical) {
+  PlanSum sum = typical.sum;
+  Prediction energy = forecaster.energy(sum);
   Reach out;
   out.energy_per_m_j = nowhere;
-  const double power_w = mean_power(once, p.expected());
+  const double power_w = mean_power(forecaster, sum, energy.expected());
   const Budget spend = budget(battery, charge, lowest_charge(battery, charge, power_w), power_w);
   out.usable_j = std::max(0.0, spend.energy_j);
   out.usable_deviation_j = spend.deviation_j;
-  if (once.impossible) {
+  if (sum.impossible) {
     out.range_m.fill(nowhere);
     out.run_time_s.fill(nowhere);
     out.mean_power_w = nowhere;
   }
-  if (once.impossible || !(p.expected() > 0)) return out;
+  if (sum.impossible || !(energy.expected() > 0)) return out;
   // As often as the charge lasts: the legs' own scatter averages out, their common deviation does not.
-  const double copies = std::max(1.0, out.usable_j / p.expected());
-  PlanSum often = once;
-  often.repeat(copies);
-  p = forecaster.energy(often);
-  out.mean_power_w = mean_power(once, p.quantile(0.5) / copies);
-  if (once.way_m > 0) out.energy_per_m_j = p.quantile(0.5) / (copies * once.way_m);
-  const double middle = out.usable_j / p.quantile(0.5);
+  sum.repeat(std::max(1.0, out.usable_j / energy.expected()));
+  energy = forecaster.energy(sum);
+  Prediction duration = forecaster.duration(sum);
+  // Halts lengthen both: their part of the uncertainty is not independent.
+  const double halted_j = std::sqrt(energy.halts.variance()) / energy.expected(),
+               halted_s = std::sqrt(duration.halts.variance()) / duration.expected();
+  for (Prediction* part : {&energy, &duration}) {
+    part->fixed += part->halts.mean();
+    part->halts = {};
+  }
+  const double energy_j = energy.quantile(0.5), duration_s = duration.quantile(0.5);
+  const double way_m = sum.way_m > 0 ? sum.way_m : nowhere, times = out.usable_j / energy_j;
+  out.mean_power_w = energy_j / duration_s;
+  out.energy_per_m_j = energy_j / way_m;
   for (std::size_t k = 0; k < stated_quantiles.size(); ++k) {
-    const double by_energy = out.usable_j / p.quantile(1 - stated_quantiles[k]) - middle;
-    const double by_charge = normal_quantile[k] * out.usable_deviation_j / p.quantile(0.5);
-    const double times =
-        copies * std::max(0.0, joined(middle, by_energy, by_charge, stated_quantiles[k] < 0.5 ? -1 : 1));
-    out.range_m[k] = once.way_m > 0 ? times * once.way_m : nowhere;
-    out.run_time_s[k] = times * once.duration_s;
+    const double q = stated_quantiles[k], z = normal_quantile[k], sign = q < 0.5 ? -1 : 1;
+    const double by_energy = energy_j / energy.quantile(1 - q) - 1,
+                 by_time = duration.quantile(q) / duration_s - 1,
+                 by_charge = out.usable_j > 0 ? z * out.usable_deviation_j / out.usable_j : 0;
+    const auto share = [&](std::initializer_list<double> offsets) {
+      return std::max(0.0, joined(1, sign, offsets));
+    };
+    out.range_m[k] = way_m * times * share({by_energy, by_charge, z * halted_j, z * typical.way_error});
+    out.run_time_s[k] =
+        duration_s * times *
+        share({by_energy, by_charge, by_time, z * (halted_s - halted_j), z * typical.duration_error});
   }
   return out;
 }

@@ -94,7 +94,14 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
                    std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
                    double confidence);
 
-// Range and run time of a robot that continues with its typical legs.
+// The recent moving legs of a robot, each with the halts that usually follow it, summed.
+struct TypicalDriving {
+  PlanSum sum;
+  // Standard errors of way and duration over energy, relative, by how the legs differ.
+  double way_error = 0, duration_error = 0;
+};
+
+// Range and run time of a robot that continues so: both by the legs' energies, ways, durations and halts.
 struct Reach {
   double usable_j = 0;
   double usable_deviation_j = 0;
@@ -104,14 +111,15 @@ struct Reach {
   std::array<double, 3> run_time_s{};
 };
 Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
-            const PlanSum& typical);
+            const TypicalDriving& typical);
 
-// The robot's recent legs carrying another payload; a straight drive while it has none.
+// The robot's recent moving legs carrying another payload; a straight drive while it has none.
 std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payload_kg);
+TypicalDriving typical_driving(const Forecaster& forecaster, std::vector<PricedLeg> legs);
 
-// The same priced by the robot's habit. Recorded halts are among the legs, so that none are added.
-std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
-                                     const StatedPace& stated, double payload_kg);
+// At the robot's pace, where none is stated.
+TypicalDriving typical_driving(const Forecaster& forecaster, const LegPricer& pricer,
+                               const StatedPace& stated, double payload_kg);
 
 // The probability that a plan ends with the reserve.
 double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 namespace joulecast::forecast {
@@ -12,7 +13,8 @@ constexpr double scatter_keep = 0.98;
 constexpr double change_keep = 0.05;  // of old evidence and scores, at the robot's last change
 constexpr double adapt_step = 0.03;   // of the logarithm of the width, at a miss of the interval
 constexpr double widest = 4, narrowest = 0.5;
-constexpr std::size_t max_typical_legs = 40;
+// Of two recorded robots 160 legs left 3.5 % of way over energy open, and 400 left 1.4 %; a request takes 1 ms.
+constexpr std::size_t max_typical_legs = 400;
 constexpr std::size_t habit_missions = 40;
 constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
@@ -76,7 +78,6 @@ void PlanSum::repeat(double copies) {
     for (double& value : motions) value *= copies;
   for (double& count : stops) count *= copies;
   stated_s *= copies;
-  duration_s *= copies;
   way_m *= copies;
 }
 
@@ -102,7 +103,6 @@ void Forecaster::extend(PlanSum& sum, const PricedLeg& leg, double copies) const
     count(sum, time, leg.motion, duration_features_of(leg.motion, loaded, leg.cost, track(time).correction),
           copies);
   if (leg.may_halt) sum.stops[leg.motion == Motion::turn ? 1 : 0] += copies;
-  sum.duration_s += copies * leg.cost.duration_s;
   sum.way_m += copies * leg.way_m;
   sum.slower = sum.slower || leg.cost.slower;
   sum.impossible = sum.impossible || leg.cost.impossible;
@@ -446,7 +446,8 @@ std::shared_ptr<const Forecaster> RobotForecast::forecaster() const {
   made->siblings = siblings_[0].robots;
   made->change = change_;
   for (auto m = missions_.rbegin(); m != missions_.rend() && made->typical.size() < max_typical_legs; ++m)
-    made->typical.insert(made->typical.end(), m->legs.begin(), m->legs.end());
+    std::ranges::copy_if(m->legs, std::back_inserter(made->typical),
+                         [](const Leg& leg) { return leg.motion != Motion::stand; });
   return made;
 }
 

@@ -33,7 +33,6 @@ struct PlanSum {
   std::array<std::array<double, motion_count>, subject_count> squares{};  // of its legs' corrected amounts
   std::array<double, 2> stops{};  // after drives, after turns, at which the robot may halt
   double stated_s = 0;            // of stated legs
-  double duration_s = 0;          // expected by the model
   double way_m = 0;
   bool slower = false, impossible = false;  // a leg is driven slower than wanted, or cannot be driven
 
@@ -55,7 +54,7 @@ class Forecaster {
   std::array<Track, subject_count> tracks;
   Habit habit;
   double standing_w = 0;
-  std::vector<Leg> typical;  // recent legs, for range and run time
+  std::vector<Leg> typical;  // recent moving legs, for range and run time
   double payload_limit_kg = 0;
   std::int64_t missions = 0;          // learnt from
   std::int64_t siblings = 0;          // robots that contributed findings

@@ -47,11 +47,11 @@ struct Forecasts::Entry {
   std::int64_t borrowed_at = -1;  // the kind's missions when its findings were pooled
   RobotOutlook outlook;
 
-  // The sum of its recent legs, valid while its inputs are unchanged.
+  // Its typical driving, valid while its inputs are unchanged.
   struct Typical {
     std::shared_ptr<const forecast::Forecaster> forecaster;
     double payload_kg = 0;
-    forecast::PlanSum sum;
+    forecast::TypicalDriving driving;
   };
   Typical typical;
 };
@@ -211,11 +211,9 @@ forecast::Reach Forecasts::live_reach(const std::shared_ptr<const ModelInForce>&
   const std::shared_ptr<const forecast::Forecaster>& forecaster = slot.outlook.forecaster;
   if (slot.typical.forecaster != forecaster || slot.typical.payload_kg != payload_kg) {
     const forecast::LegPricer pricer(model->robot, model->drive);
-    slot.typical = {
-        forecaster, payload_kg,
-        forecast::sum_of(*forecaster, forecast::price_typical(*forecaster, pricer, {}, payload_kg))};
+    slot.typical = {forecaster, payload_kg, forecast::typical_driving(*forecaster, pricer, {}, payload_kg)};
   }
-  return forecast::reach(*forecaster, *slot.outlook.battery, charge, slot.typical.sum);
+  return forecast::reach(*forecaster, *slot.outlook.battery, charge, slot.typical.driving);
 }
 
 RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {

@@ -240,7 +240,7 @@ TEST(Reach, RangeFollowsTheCharge) {
   const Forecaster f = forecaster(0.04, 0.2);
   const ChargeMap map = battery();
   const std::vector<PricedLeg> typical{drive(500, 10), {Motion::stand, 0, 0, {5, 100, 0, 0}}};
-  const Reach r = reach(f, map, {0.6, 0, 0.15}, sum_of(f, typical));
+  const Reach r = reach(f, map, {0.6, 0, 0.15}, {sum_of(f, typical)});
   EXPECT_NEAR(r.energy_per_m_j, 60, 1e-9);
   EXPECT_NEAR(r.mean_power_w, 60, 1e-9);
   EXPECT_NEAR(r.usable_j, map.energy_j(0.6, 0.15, 60), 1e-6);
@@ -256,7 +256,7 @@ TEST(Reach, RangeFollowsTheCharge) {
 TEST(Reach, RangeIsZeroAtReserve) {
   const Forecaster f = forecaster(0.04, 0.2);
   const std::vector<PricedLeg> typical{drive(500)};
-  const Reach r = reach(f, battery(), {0.1, 0, 0.15}, sum_of(f, typical));
+  const Reach r = reach(f, battery(), {0.1, 0, 0.15}, {sum_of(f, typical)});
   EXPECT_EQ(r.usable_j, 0);
   EXPECT_EQ(r.range_m[2], 0);
 }

@@ -190,13 +190,17 @@ TEST(RobotForecast, IgnoresUnmeasuredMissions) {
   EXPECT_EQ(forecast.forecaster()->missions, 0);
 }
 
-PlanSum stated_drives(const Forecaster& f, const MadeMissions& made, double payload_kg, Driving driving) {
+constexpr int stated_count = 10;
+
+PricedLeg stated_drive(const MadeMissions& made, double payload_kg, Driving driving) {
   const LegPricer pricer(made.robot, made.drive);
+  return {Motion::drive, payload_kg, 6,
+          pricer.paced(PlannedLeg{Motion::drive, 6, 0, payload_kg, 0}, default_pace(made.robot)), driving};
+}
+
+PlanSum stated_drives(const Forecaster& f, const MadeMissions& made, double payload_kg, Driving driving) {
   PlanSum sum;
-  for (int k = 0; k < 10; ++k)
-    f.extend(sum, {Motion::drive, payload_kg, 6,
-                   pricer.paced(PlannedLeg{Motion::drive, 6, 0, payload_kg, 0}, default_pace(made.robot)),
-                   driving});
+  f.extend(sum, stated_drive(made, payload_kg, driving), stated_count);
   return sum;
 }
 
@@ -217,10 +221,10 @@ TEST(RobotForecast, LearnsHowPlansAreFollowed) {
       forecast.learn(std::move(mission));
     }
     const auto f = forecast.forecaster();
-    const PlanSum sum = stated_drives(*f, made, 0, Driving::stated);
-    const Prediction p = f->duration(sum);
-    EXPECT_NEAR(p.quantile(0.5) / sum.duration_s, commanded ? 1.02 : 1, 0.004);
-    const double width = (p.quantile(0.95) - p.quantile(0.05)) / sum.duration_s;
+    const Prediction p = f->duration(stated_drives(*f, made, 0, Driving::stated));
+    const double planned_s = stated_count * stated_drive(made, 0, Driving::stated).cost.duration_s;
+    EXPECT_NEAR(p.quantile(0.5) / planned_s, commanded ? 1.02 : 1, 0.004);
+    const double width = (p.quantile(0.95) - p.quantile(0.05)) / planned_s;
     if (commanded)
       EXPECT_LT(width, 0.05);
     else
@@ -411,10 +415,11 @@ TEST(RobotForecast, FirstPlansLastAsStated) {
   }
   forecast.learn(std::move(mission));
   const auto f = forecast.forecaster();
-  const PlanSum sum = stated_drives(*f, made, made.robot.limits.payload_kg, Driving::stated);
-  const Prediction p = f->duration(sum);
-  EXPECT_NEAR(p.quantile(0.5) / sum.duration_s, 1, 0.01);
-  EXPECT_LT((p.quantile(0.95) - p.quantile(0.05)) / sum.duration_s, 0.2);
+  const double payload_kg = made.robot.limits.payload_kg;
+  const Prediction p = f->duration(stated_drives(*f, made, payload_kg, Driving::stated));
+  const double planned_s = stated_count * stated_drive(made, payload_kg, Driving::stated).cost.duration_s;
+  EXPECT_NEAR(p.quantile(0.5) / planned_s, 1, 0.01);
+  EXPECT_LT((p.quantile(0.95) - p.quantile(0.05)) / planned_s, 0.2);
 }
 
 // Turns take three times the model's energy, drives one and a half times, and either 0.4 more with the full
