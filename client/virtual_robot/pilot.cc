@@ -140,7 +140,7 @@ SpeedController::SpeedController(const RobotParameters& robot, const ControllerT
 
 void SpeedController::set_payload(double declared_kg) {
   const double mass_kg = robot_.chassis_kg + 2 * robot_.wheel_kg + declared_kg;
-  const double yaw_kg_m2 = robot_.yaw_inertia_kg_m2 + 0.02 * declared_kg;
+  const double yaw_kg_m2 = robot_.yaw_inertia_kg_m2 + robot_.payload_yaw_inertia_m2 * declared_kg;
   const double lever = robot_.wheel_radius_m / robot_.half_track_m;
   straight_inertia_ =
       robot_.wheel_inertia_kg_m2 + 0.5 * mass_kg * robot_.wheel_radius_m * robot_.wheel_radius_m;

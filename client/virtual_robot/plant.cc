@@ -7,7 +7,6 @@ namespace joulecast::virtual_robot {
 namespace {
 
 constexpr double gravity_m_s2 = 9.80665;
-constexpr double payload_yaw_m2 = 0.02;  // yaw inertia of a kilogram of payload, by the robot file's contract
 constexpr double copper_per_kelvin = 0.00393;
 constexpr double scrub_rate_rad_s = 0.02;          // yaw rate at which the tyres have built up their moment
 constexpr double gear_speed_rad_s = 0.05;          // wheel speed at which mesh losses have built up
@@ -97,8 +96,8 @@ void Plant::update_inertia() {
   const double mass_kg = chassis_kg + 2 * robot_.wheel_kg + payload_kg_;
   weight_n_ = mass_kg * gravity_m_s2;
   inertial_mass_kg_ = mass_kg * (1 + effect_.linear_inertia_error);
-  yaw_inertia_kg_m2_ =
-      robot_.yaw_inertia_kg_m2 * (1 + effect_.yaw_inertia_error) + payload_yaw_m2 * payload_kg_;
+  yaw_inertia_kg_m2_ = robot_.yaw_inertia_kg_m2 * (1 + effect_.yaw_inertia_error) +
+                       robot_.payload_yaw_inertia_m2 * payload_kg_;
   coupling_kg_m_ = chassis_kg * (robot_.com_offset_m + effect_.com_offset);
   payload_floor_n_ = effect_.load_rolling_resistance * payload_kg_ * gravity_m_s2;
   payload_flex_n_s_m_ = effect_.x_payload_speed * payload_kg_ * gravity_m_s2 / robot_.speed_limit_m_s;

@@ -71,6 +71,7 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.chassis_kg = in.number("/mass/chassis_kg", Sign::positive);
   p.wheel_kg = in.number("/mass/wheel_kg", Sign::not_negative, 0);
   p.yaw_inertia_kg_m2 = in.number("/mass/yaw_inertia_kg_m2", Sign::positive);
+  p.payload_yaw_inertia_m2 = in.number("/mass/payload_yaw_inertia_m2", Sign::not_negative, 0.02);
   p.wheel_inertia_kg_m2 = in.number("/mass/wheel_inertia_kg_m2", Sign::not_negative, 0) +
                           in.number("/motor/rotor_inertia_kg_m2", Sign::not_negative, 0);
   p.resistance_ohm = in.number("/motor/resistance_ohm", Sign::positive);

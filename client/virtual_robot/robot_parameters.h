@@ -19,7 +19,8 @@ struct RobotParameters {
   double chassis_kg = 0;
   double wheel_kg = 0;
   double yaw_inertia_kg_m2 = 0;
-  double wheel_inertia_kg_m2 = 0;  // wheel and rotor together, at the wheel
+  double payload_yaw_inertia_m2 = 0;  // that each kilogram of payload adds
+  double wheel_inertia_kg_m2 = 0;     // wheel and rotor together, at the wheel
   double resistance_ohm = 0;
   double inductance_h = 0;
   double torque_constant_nm_a = 0;

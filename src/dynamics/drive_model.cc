@@ -55,7 +55,7 @@ TorqueBalance<S> BasicDriveModel<S>::balance(const Instant& at) const {
 
   const S payload = p.payload_factor * at.payload_kg + p.payload_extra_kg;
   const S mass = p.chassis_kg + 2.0 * p.wheel_kg + payload;
-  const S yaw_inertia = p.yaw_inertia_kg_m2 + payload * robot::payload_yaw_inertia_m2;
+  const S yaw_inertia = p.yaw_inertia_kg_m2 + payload * p.payload_yaw_inertia_m2;
   const S coupling = p.chassis_kg * p.com_offset_m;
   // Thesis (2-31) in the body frame: F = m a - m_c d yaw^2, N = I yaw' + m_c d v yaw.
   const S force = mass * p.inertial_factor * b.body.acceleration_m_s2 -

@@ -32,11 +32,12 @@ struct Parameters {
 
   S chassis_kg = 0;
   S wheel_kg = 0;
-  S payload_factor = 1;       // true over declared payload
-  S payload_extra_kg = 0;     // undeclared payload
-  S inertial_factor = 1;      // translational inertia over mass
-  S yaw_inertia_kg_m2 = 0;    // without payload
-  S wheel_inertia_kg_m2 = 0;  // wheel and rotor, at the wheel
+  S payload_factor = 1;          // true over declared payload
+  S payload_extra_kg = 0;        // undeclared payload
+  S inertial_factor = 1;         // translational inertia over mass
+  S yaw_inertia_kg_m2 = 0;       // without payload
+  S payload_yaw_inertia_m2 = 0;  // that each kilogram of payload adds
+  S wheel_inertia_kg_m2 = 0;     // wheel and rotor, at the wheel
 
   std::array<S, 2> friction_torque_nm{};
   S viscous_friction_nm_s_rad = 0;
@@ -78,6 +79,7 @@ Parameters<S> nominal_parameters(const robot::RobotModel& robot) {
   p.chassis_kg = robot.mass.chassis_kg;
   p.wheel_kg = robot.mass.wheel_kg;
   p.yaw_inertia_kg_m2 = robot.mass.yaw_inertia_kg_m2;
+  p.payload_yaw_inertia_m2 = robot.mass.payload_yaw_inertia_m2.value_or(robot::payload_yaw_inertia_m2);
   p.wheel_inertia_kg_m2 = robot.mass.wheel_inertia_kg_m2 + robot.motor.rotor_inertia_kg_m2;
   p.friction_torque_nm = {S(robot.motor.friction_torque_nm[0]), S(robot.motor.friction_torque_nm[1])};
   p.viscous_friction_nm_s_rad = robot.motor.viscous_friction_nm_s_rad;

@@ -15,7 +15,8 @@ inline constexpr std::size_t left = 1;
 
 inline constexpr double standard_gravity_m_s2 = 9.80665;
 
-// Yaw inertia that each kilogram of payload adds; the payload sits over the axle [m^2].
+// Yaw inertia that each kilogram of payload adds, unless the file states it; the payload sits over the axle
+// [m^2].
 inline constexpr double payload_yaw_inertia_m2 = 0.02;
 
 struct Kinematics {
@@ -31,6 +32,7 @@ struct Mass {
   double wheel_kg = 0;           // one wheel with its rotor
   double yaw_inertia_kg_m2 = 0;  // whole robot without payload, about the vertical through the axle's middle
   double wheel_inertia_kg_m2 = 0;  // one wheel about its axle
+  std::optional<double> payload_yaw_inertia_m2 = std::nullopt;
 
   friend bool operator==(const Mass&, const Mass&) = default;
 };

@@ -34,6 +34,7 @@ RobotModel full_model() {
   RobotModel model = nomad();
   model.robot_id = "a.B_9-z";
   model.kinematics.com_offset_m = -0.03;
+  model.mass.payload_yaw_inertia_m2 = 0.17;
   model.motor.rotor_inertia_kg_m2 = 0.001;
   model.battery.open_circuit_voltage = {{0, 18.1}, {0.1, 21}, {0.5, 21}, {1, 25.2}};
   model.battery.resistance_curve = {{0.1, 0.2}, {0.9, 0.1}};
