@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <concepts>
 #include <cstdint>
@@ -173,7 +175,11 @@ CLI::App* add_command(CLI::App& parent, Exit& exit, const char* name, const char
   add_examples(*command, examples);
   command->callback([options, run, command, &exit] {
     if (!command->get_subcommands().empty()) return;  // a subcommand runs instead
-    const Result<Exit> done = run(*options);
+    Result<Exit> done = run(*options);
+    if constexpr (requires { options->logs; }) {
+      if (!done && done.error().field == "log")
+        done.error().field = fmt::format("{}", fmt::join(options->logs, ", "));
+    }
     exit = done ? *done : report(done.error());
   });
   return command;

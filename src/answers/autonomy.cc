@@ -727,14 +727,12 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   out.charge = charge;
   out.charge_is_live = !input.state_of_charge;
   out.payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
-  const double limit = model.robot.limits.payload_kg;
-  const auto too_heavy = [&](const std::string& field, double payload_kg) {
-    return invalid(field, fmt::format("is {}, must be at most the robot's limit of {}", payload_kg, limit));
-  };
-  if (input.payload_kg && *input.payload_kg > limit) return too_heavy("/payload_kg", *input.payload_kg);
+  const described::Limit limit{model.robot.limits.payload_kg, payload_limit_member};
+  if (input.payload_kg > limit.value)
+    return invalid("/payload_kg", described::above(*input.payload_kg, limit));
   for (std::size_t k = 0; k < input.tasks.size(); ++k)
-    if (plan.tasks[k].greatest_payload_kg > limit)
-      return too_heavy(fmt::format("/tasks/{}/payload_kg", k), plan.tasks[k].greatest_payload_kg);
+    if (const double payload_kg = plan.tasks[k].greatest_payload_kg; payload_kg > limit.value)
+      return invalid(fmt::format("/tasks/{}/payload_kg", k), described::above(payload_kg, limit));
 
   const bool minimum_energy = input.driving == Driving::minimum_energy;
   out.track = minimum_energy || paces_stated(input, plan) ? Track::stated : Track::usual;
@@ -807,7 +805,6 @@ Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, c
   AutonomyRequest request;
   request.input.compare_minimum_energy = single;
   AutonomyContext context;
-  context.payload_limit_kg = payload_kg_bounds.maximum;
   context.may_stand = true;
   return autonomy_input.read(body, std::move(request), context, at);
 }

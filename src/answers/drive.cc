@@ -56,10 +56,6 @@ constexpr described::Count segments_of_path{1, 10'000, "segments"};
 template <class Form>
 using Part = Input<Form, PathContext>;
 
-double payload_limit(const auto&, const PathContext& context) {
-  return context.payload_limit_kg;
-}
-
 // The lesser of the robot's own limit and the given one.
 auto tightened(double Limits::*limit) {
   return [limit](Limits& limits, std::optional<double> own) {
@@ -170,12 +166,11 @@ void read_legs(Fields& fields, Way& way, PathContext& context) {
 }
 
 // There without payload, from there to the drop-off with it.
-void read_stations(Fields& fields, Way& way, PathContext& context) {
+void read_stations(Fields& fields, Way& way, PathContext&) {
   const planning::Stations& at = *way.stations;
   if (!at.pickup) fields.required("pickup");
   if (!at.dropoff) fields.required("dropoff");
-  const Bounds allowed{.minimum = 0, .maximum = context.payload_limit_kg};
-  const double payload_kg = fields.has("payload_kg") ? fields.number("payload_kg", allowed) : 0;
+  const double payload_kg = fields.has("payload_kg") ? fields.number("payload_kg", not_negative) : 0;
   if (!fields.ok()) return;
   const auto towards = [](const planning::Station& to) {
     return planning::Polyline{{{to.x_m, to.y_m}}, to.heading_rad};
@@ -208,8 +203,8 @@ const Input<planning::Station>& station_input() {
   return input;
 }
 
-double greatest_speed(const DriveInput& drive, const PathContext&) {
-  return drive.problem.limits.speed_m_s;
+described::Limit greatest_speed(const DriveInput& drive, const PathContext&) {
+  return {drive.problem.limits.speed_m_s, "limits/speed_m_s"};
 }
 
 // Positions may be null where the start is not given.

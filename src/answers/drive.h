@@ -2,6 +2,7 @@
 
 #include <array>
 #include <initializer_list>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -61,11 +62,17 @@ inline constexpr Bounds value_of_time_bounds_w{.minimum = 0, .maximum = most_val
 // Refuses these members, which apply only to a planned motion.
 void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> names);
 
+inline constexpr std::string_view payload_limit_member = "limits/payload_kg of the robot file";
+
 // The context of the reader of a way.
 struct PathContext {
-  double payload_limit_kg = 0;
-  bool may_stand = false;  // no way is none
+  double payload_limit_kg = std::numeric_limits<double>::infinity();  // of the robot, where it is known
+  bool may_stand = false;                                             // no way is none
 };
+
+inline described::Limit payload_limit(const auto&, const PathContext& context) {
+  return {context.payload_limit_kg, payload_limit_member};
+}
 
 // "x_m" and "y_m".
 template <class T>

@@ -274,8 +274,7 @@ const auto given_input =
             {}, columns_input)
         .number(
             "payload_kg", [](EstimateInput& input) -> double& { return given_motion(input).payload_kg; },
-            not_negative, "at the start", 0,
-            [](const EstimateInput&, const PathContext& context) { return context.payload_limit_kg; })
+            not_negative, "at the start", 0, payload_limit<EstimateInput>)
         .object(
             "start_pose",
             [](EstimateInput& input, const planning::Pose& pose) {

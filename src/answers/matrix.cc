@@ -103,8 +103,6 @@ struct ReadTask {
   bool former = false;
 };
 struct MatrixContext : PathContext {
-  MatrixContext() : PathContext{.payload_limit_kg = std::numeric_limits<double>::infinity()} {}
-
   std::size_t robots = 0;
 };
 

@@ -1,5 +1,7 @@
 #include "describe/input.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdint>
 
@@ -18,6 +20,10 @@ const nlohmann::json* read_array(Fields& fields, std::string_view name, const Co
 Schema of_number(double value) {
   if (std::nearbyint(value) == value) return static_cast<std::int64_t>(value);
   return value;
+}
+
+std::string above(double value, const Limit& limit) {
+  return fmt::format("is {}, must be at most {}, {}", value, limit.value, limit.member);
 }
 
 Schema of_bounds(const Bounds& bounds) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <concepts>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -32,6 +33,14 @@ const nlohmann::json* read_array(Fields& fields, std::string_view name, const Co
 // A whole number without a point.
 Schema of_number(double value);
 Schema of_bounds(const Bounds& bounds);
+
+// A greatest value, and the member that states it.
+struct Limit {
+  double value = std::numeric_limits<double>::infinity();
+  std::string_view member = {};
+};
+// "is 10, must be at most 0, limits/payload_kg of the robot file"
+std::string above(double value, const Limit& limit);
 // {"minItems", "maxItems"}
 Schema of_count(const Count& count);
 
@@ -55,7 +64,7 @@ template <class T, class Context = Nothing>
 class Input {
  public:
   using Read = std::function<void(Fields&, T&, Context&)>;
-  using Most = std::function<double(const T&, const Context&)>;
+  using Most = std::function<Limit(const T&, const Context&)>;
 
   explicit Input(std::string title = {}, std::string words = {})
       : title_(std::move(title)), words_(std::move(words)) {}
@@ -70,9 +79,10 @@ class Input {
   Input& number(const char* name, Target target, const Bounds& bounds, std::string_view words,
                 std::optional<double> fallback = {}, Most most = {}) {
     const auto read = [name, bounds, most](Fields& fields, const T& object, const Context& context) {
-      Bounds allowed = bounds;
-      if (most) allowed.maximum = most(object, context);
-      return fields.number(name, allowed);
+      const double value = fields.number(name, bounds);
+      if (const Limit limit = most ? most(object, context) : Limit{}; value > limit.value)
+        fields.fault(name, above(value, limit));
+      return value;
     };
     return scalar<double>(name, target, of_bounds(bounds), words, fallback, read);
   }

@@ -407,8 +407,8 @@ class Calibrator {
          {"viscous_friction_nm_s_rad", "N m s/rad"},
          {"straight inertia", "kg m2"},
          {"turning inertia", "kg m2"}}};
-    constexpr std::array<std::string_view, torque_count> meanings{"", "", "", "m r^2/2 + I_w + I_s",
-                                                                  "2 I c^2 + I_w + I_s"};
+    constexpr std::array<std::string_view, torque_count> meanings{"", "", "", straight_inertia_sum,
+                                                                  turning_inertia_sum};
     for (std::size_t k = 0; k < torque_count; ++k) {
       const auto at = static_cast<Eigen::Index>(k);
       add(names[k].first, names[k].second, s.torque[at], error[at + 2], fitted_[k],

@@ -20,9 +20,14 @@ namespace joulecast::energy {
 
 // Inertia of an empty robot at each wheel's motor [kg m^2].
 struct WheelInertia {
-  double straight = 0;  // both wheels with the same acceleration: m r^2/2 + I_w + I_s
-  double turning = 0;   // they accelerate oppositely: 2 I c^2 + I_w + I_s, c = r/(2l)
+  double straight = 0;  // both wheels with the same acceleration
+  double turning = 0;   // they accelerate oppositely
 };
+
+// By members of the robot file; mass is that of the whole robot.
+inline constexpr std::string_view
+    straight_inertia_sum = "mass * wheel_radius^2 / 2 + wheel_inertia + rotor_inertia",
+    turning_inertia_sum = "yaw_inertia * (wheel_radius / half_track)^2 / 2 + wheel_inertia + rotor_inertia";
 
 WheelInertia wheel_inertia(const robot::RobotModel& robot);
 
@@ -58,10 +63,8 @@ inline constexpr std::array<PowerParameter, PowerParameter::count> power_paramet
     {"friction_torque_nm right - left", "N m", "",
      "both wheels turn alike, so that only the sum of their frictions counts"},
     {"viscous_friction_nm_s_rad", "N m s/rad", "", "the robot barely moves, or always at one speed"},
-    {"straight inertia", "kg m2",
-     "m r^2/2 + I_w + I_s; rotors: the part that the file's mass does not explain",
-     "the speed changes too little"},
-    {"turning inertia", "kg m2", "2 I c^2 + I_w + I_s", "the rate of turning changes too little"},
+    {"straight inertia", "kg m2", straight_inertia_sum, "the speed changes too little"},
+    {"turning inertia", "kg m2", turning_inertia_sum, "the rate of turning changes too little"},
     {"resistance_ohm", "ohm", "from the copper loss alone, as resistance / torque constant^2",
      "it changes only the copper loss, which is too small"},
     {"turning_scrub", "1", "effect, adopted", "the robot barely turns"},

@@ -192,7 +192,7 @@ Result<LogRecordings> read_recordings(std::span<const std::string> paths, const 
   for (const std::string& path : paths) {
     const std::uint64_t before = tally.events;
     TRY(read_events(path, take, tally));
-    if (tally.events == before) return invalid("log", path + " is not an LCM event log, or is empty");
+    if (tally.events == before) return invalid(path, "is not an LCM event log, or is empty");
   }
   if (!paths.empty()) TRY(need_robots(paths.front(), tally));
   return collector.finish(tally.damaged_places);

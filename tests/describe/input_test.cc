@@ -56,7 +56,9 @@ const Input<Order, Robot>& order() {
       Input<Order, Robot>("An order")
           .text("id", &Order::id, 4, "its name")
           .number("load_kg", &Order::load_kg, not_negative, "load", 1,
-                  [](const Order&, const Robot& robot) { return robot.limit_kg; })
+                  [](const Order&, const Robot& robot) {
+                    return Limit{robot.limit_kg, "limit_kg of the cart"};
+                  })
           .number("deadline_s", &Order::deadline_s, positive, "latest end")
           .choice("speed", &Order::speed, std::array{"slow", "fast"}, "speed", 0)
           .boolean("urgent", &Order::urgent, "goes first", false)
@@ -115,7 +117,8 @@ TEST(Input, AbsentAndNullAreDefaults) {
 TEST(Input, NamesFieldAndConstraint) {
   EXPECT_EQ(fault_of({{"ID", "a"}}), "/id: is required; unknown here: ID");
   EXPECT_EQ(fault_of({{"id", "abcde"}}), "/id: has 5 bytes, must have at most 4");
-  EXPECT_EQ(fault_of({{"id", "a"}, {"load_kg", 11}}), "/load_kg: is 11, must be at least 0 and at most 10");
+  EXPECT_EQ(fault_of({{"id", "a"}, {"load_kg", 11}}),
+            "/load_kg: is 11, must be at most 10, limit_kg of the cart");
   EXPECT_EQ(fault_of({{"id", "a"}, {"speed", "late"}}), "/speed: is \"late\", must be one of slow, fast");
   EXPECT_EQ(fault_of({{"id", "a"}, {"parts", json::array()}}), "/parts: must be an array of 1 to 3 parts");
   EXPECT_EQ(fault_of({{"id", "a"}, {"shapes", {1, 2, 3}}}), "/shapes: must be an array of at most 2 shapes");
