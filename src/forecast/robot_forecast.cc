@@ -13,7 +13,7 @@ constexpr double scatter_keep = 0.98;
 constexpr double change_keep = 0.05;  // of old evidence and scores, at the robot's last change
 constexpr double adapt_step = 0.03;   // of the logarithm of the width, at a miss of the interval
 constexpr double widest = 4, narrowest = 0.5;
-// Of two recorded robots 160 legs left 3.5 % of way over energy open, and 400 left 1.4 %; a request takes 1 ms.
+// Of two recorded robots 160 legs left 3.5 % of way over energy open, 400 left 1.4 %; a request takes 1 ms.
 constexpr std::size_t max_typical_legs = 400;
 constexpr std::size_t habit_missions = 40;
 constexpr double least_amount = 1;   // J, s
